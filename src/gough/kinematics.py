@@ -1,0 +1,207 @@
+"""Leg readings of a pose, their derivative, and how far the pose is from a singularity.
+
+Every kind of leg is a telescopic strut seen differently. With pose (t, R), pivot c, base
+joint b_i and platform joint p_i the strut is
+
+    d_i = R (p_i - c) + c + t - b_i,        length |d_i|
+
+and its length changes with the twist (v, w) of the pose -- v the velocity of the pivot, w
+the angular velocity, both in base coordinates -- as
+
+    d|d_i| = n_i . v + (R (p_i - c) x n_i) . w,        n_i = d_i / |d_i|
+
+(Merlet, Parallel Robots, 2nd ed., sec. 5.1). A rotary leg has a fixed |d_i| and moves b_i.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gough.checks import Array, as_batch
+from gough.errors import GoughError
+from gough.platform import Platform
+from gough.pose import Pose
+
+
+def joint_positions(platform: Platform, pose: Pose) -> Array:
+    """Platform joints in base coordinates (..., 6, 3) [platform unit]."""
+    return _arms(platform, pose) + (platform.pivot_point + pose.position)[..., None, :]
+
+
+def strut_vectors(platform: Platform, pose: Pose) -> Array:
+    """From base joint to platform joint, (..., 6, 3) [platform unit].
+
+    For rotary legs the base joint is the arm's centre here, not its tip.
+    """
+    return joint_positions(platform, pose) - platform.base
+
+
+def leg_lengths(platform: Platform, pose: Pose) -> Array:
+    """Inverse kinematics: the readings of the six legs, (..., 6).
+
+    Args:
+        pose: batch axes (...).
+
+    Returns:
+        Lengths [platform unit], lengths minus those at home [platform unit], or motor angles
+        [rad], by the platform's kind of leg. NaN where a motor's arm and rod cannot reach.
+    """
+    if platform.rotary is not None:
+        return _motor_angles(platform, pose)
+    lengths = np.linalg.norm(strut_vectors(platform, pose), axis=-1)
+    return lengths - platform.home_lengths if platform.legs == "length_change" else lengths
+
+
+def equivalent_struts(platform: Platform, legs: ArrayLike) -> tuple[Array, Array]:
+    """The telescopic hexapod that readings stand for: where its struts start, how long they are.
+
+    Args:
+        legs: readings (..., 6).
+
+    Returns:
+        Base joints (..., 6, 3) and strut lengths (..., 6) [platform unit].
+    """
+    readings = as_batch("legs", legs, (6,))
+    if platform.rotary is not None:
+        arms = platform.rotary
+        tips = platform.base + arms.arm_length * _arm_directions(platform, readings)[0]
+        return tips, np.full(readings.shape, arms.rod_length)
+    lengths = readings + platform.home_lengths if platform.legs == "length_change" else readings
+    return np.broadcast_to(platform.base, (*readings.shape, 3)), lengths
+
+
+def jacobian(platform: Platform, pose: Pose) -> Array:
+    """d legs / d twist, (..., 6, 6).
+
+    The twist is (velocity of the pose's position, angular velocity), both in base
+    coordinates. Units: 1 and [platform unit / rad], or [rad / platform unit] and 1 for rotary
+    legs, whose rows are NaN where the motor cannot reach and infinite where arm and rod align.
+    """
+    struts, rates = _struts_and_rates(platform, pose)
+    rows = np.concatenate([struts, np.cross(_arms(platform, pose), struts)], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return rows / rates[..., None]
+
+
+def singularity_distance(platform: Platform, pose: Pose) -> Array:
+    """Distance to the nearest singularity, (...), a number without unit: 0 is singular.
+
+    The smallest singular value of the 6x6 matrix with rows (n_i, m_i), n_i the unit vector
+    along strut i and m_i = r_i x n_i / L its moment about the centre of the platform joints;
+    L is their root mean square distance from that centre. By Eckart and Young it is the
+    distance, in the spectral norm, to the nearest singular matrix; neither the unit of length
+    nor the choice of frames, pivot or tool point changes it. A leg error e moves the joints by
+    up to about e / value.
+    """
+    rows, known = _finite_rows(normalised_jacobian(platform, pose))
+    smallest = np.linalg.svd(rows, compute_uv=False)[..., -1]
+    return np.where(known, smallest, np.nan)[()]
+
+
+def assembly_sign(platform: Platform, pose: Pose) -> Array:
+    """Sign of det(Jacobian) times that at home, (...): -1 means a singularity lies between.
+
+    NaN where the pose is, or where a motor cannot reach it.
+    """
+    home = np.linalg.slogdet(normalised_jacobian(platform, platform.home))[0]
+    rows, known = _finite_rows(normalised_jacobian(platform, pose))
+    return np.where(known, np.linalg.slogdet(rows)[0] * home, np.nan)[()]
+
+
+def normalised_jacobian(platform: Platform, pose: Pose) -> Array:
+    """Rows (n_i, m_i) without units, (..., 6, 6); see `singularity_distance`."""
+    struts, _ = _struts_and_rates(platform, pose)
+    directions = struts / np.linalg.norm(struts, axis=-1, keepdims=True)
+    arms = _arms(platform, pose)
+    arms = arms - arms.mean(axis=-2, keepdims=True)
+    return np.concatenate([directions, np.cross(arms, directions) / joint_radius(platform)], -1)
+
+
+def _finite_rows(matrices: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Matrices (..., 6, 6) with those that hold NaN zeroed, and which (...) did not."""
+    known = np.all(np.isfinite(matrices), axis=(-2, -1))
+    return np.where(known[..., None, None], matrices, 0.0), known
+
+
+def joint_radius(platform: Platform) -> float:
+    """Root mean square distance of the platform joints from their centre [platform unit]."""
+    offsets = platform.moving - platform.moving.mean(axis=0)
+    return float(np.sqrt(np.mean(np.sum(offsets**2, axis=-1))))
+
+
+def pose_covariance(platform: Platform, pose: Pose, leg_noise: ArrayLike) -> Array:
+    """Covariance of the pose that noise of the leg readings causes, (..., 6, 6).
+
+    To first order, C_pose = J^-1 C_legs J^-T, in the twist coordinates of `jacobian`:
+    position [platform unit], then rotation vector in base coordinates [rad].
+
+    Args:
+        leg_noise: standard deviation of every reading (a number) or of each (6,), or the
+            covariance (6, 6) of the readings.
+
+    Returns:
+        (..., 6, 6); NaN where the pose is singular.
+
+    Raises:
+        GoughError: noise of another shape, negative or not finite.
+    """
+    noise = np.asarray(leg_noise, dtype=float)
+    if noise.shape not in ((), (6,), (6, 6)):
+        raise GoughError(f"leg_noise: expected a number, (6,) or (6, 6), got {noise.shape}")
+    if not np.all(np.isfinite(noise)) or (noise.ndim < 2 and np.any(noise < 0)):
+        raise GoughError(f"leg_noise: expected standard deviations of 0 or more, found {noise}")
+    if noise.ndim == 2:
+        covariance = noise
+    else:
+        covariance = np.diag(np.broadcast_to(noise, 6) ** 2)
+    J = jacobian(platform, pose)
+    rows, known = _finite_rows(J)
+    regular = (known & (np.linalg.det(rows) != 0))[..., None, None]
+    inverse = np.linalg.inv(np.where(regular, J, np.eye(6)))
+    return np.where(regular, inverse @ covariance @ np.swapaxes(inverse, -1, -2), np.nan)
+
+
+def _arms(platform: Platform, pose: Pose) -> Array:
+    """R (p_i - c), from pivot to platform joints in base directions, (..., 6, 3)."""
+    return (platform.moving - platform.pivot_point) @ np.swapaxes(pose.rotation, -1, -2)
+
+
+def _arm_directions(platform: Platform, angles: Array) -> tuple[Array, Array]:
+    """Unit vectors along the motor arms, and their derivative, each (..., 6, 3)."""
+    assert platform.rotary is not None
+    x, y = platform.rotary.axis_x, platform.rotary.axis_y
+    cos, sin = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def _struts_and_rates(platform: Platform, pose: Pose) -> tuple[Array, Array]:
+    """Struts (..., 6, 3), and what their rows are divided by to give d reading / d twist.
+
+    A telescopic reading changes by d . dP / |d|. A rotary one keeps |P - tip(q)|, so
+    d . (dP - tip'(q) dq) = 0 and dq = d . dP / (d . tip'(q)).
+    """
+    struts = strut_vectors(platform, pose)
+    if platform.rotary is None:
+        return struts, np.linalg.norm(struts, axis=-1)
+    arm, slope = _arm_directions(platform, _motor_angles(platform, pose))
+    length = platform.rotary.arm_length
+    rods = struts - length * arm
+    return rods, length * np.sum(rods * slope, axis=-1)
+
+
+def _motor_angles(platform: Platform, pose: Pose) -> Array:
+    """Angles whose arm tips are one rod length from the platform joints, (..., 6) [rad].
+
+    With (x, y) the joint in the arm's plane, h = |(x, y)|, D its distance from the centre:
+    |joint - tip|^2 = rod^2 becomes 2 a h cos(q - atan2(y, x)) = D^2 + a^2 - rod^2.
+    """
+    arms = platform.rotary
+    assert arms is not None
+    joint = strut_vectors(platform, pose)
+    x, y = np.sum(joint * arms.axis_x, axis=-1), np.sum(joint * arms.axis_y, axis=-1)
+    reach = 2 * arms.arm_length * np.hypot(x, y)
+    wanted = np.sum(joint**2, axis=-1) + arms.arm_length**2 - arms.rod_length**2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        angle = np.arctan2(y, x) + arms.branch * np.arccos(wanted / reach)
+    return np.arctan2(np.sin(angle), np.cos(angle))

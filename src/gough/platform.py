@@ -1,0 +1,299 @@
+"""What a hexapod is: twelve joints, a home pose, the kind of leg, limits and a unit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import KW_ONLY, dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gough.checks import Array, platform_field, platform_numbers
+from gough.errors import PlatformError
+from gough.pose import Pose
+from gough.rotary import RotaryArms
+from gough.workspace import Workspace
+
+LegKind = Literal["telescopic", "length_change", "rotary"]
+COINCIDENT = 1e-9  # joints closer than this share of the platform's size are one point
+
+
+@dataclass(frozen=True, eq=False)
+class Platform:
+    """A Gough-Stewart platform. Leg i runs from base joint i to platform joint i.
+
+    Where a pose (t, R) puts the platform joint p:  R (p - c) + c + t, with pivot c (zero
+    unless given): the rotation is about the pivot, and t is how far the pivot has moved.
+
+    Attributes:
+        base: (6, 3) base joints in base coordinates [platform unit]; for rotary legs the
+            centres of the motors' arms.
+        moving: (6, 3) platform joints in platform coordinates [platform unit].
+        home: the pose at rest; a position (3,) stands for no rotation.
+        unit: name of the length unit; a label, nothing is ever converted by it.
+        name: what the platform is called in messages.
+        legs: "telescopic" (readings are leg lengths), "length_change" (readings are lengths
+            minus those at home) or "rotary" (readings are motor angles [rad]).
+        stroke: (6, 2) lowest and highest reading of each leg, or one pair for all.
+        pivot: (3,) point of the platform, in its own coordinates, that poses rotate about.
+        workspace: the poses the machine is meant for.
+        rotary: the motor arms, for rotary legs only.
+
+    Raises:
+        PlatformError: naming the field, what was found and what was expected.
+    """
+
+    base: Array
+    moving: Array
+    home: Pose = Pose((0.0, 0.0, 0.0))
+    _: KW_ONLY
+    unit: str = ""
+    name: str = "unnamed"
+    legs: LegKind = "telescopic"
+    stroke: Array | None = None
+    pivot: Array | None = None
+    workspace: Workspace | None = None
+    rotary: RotaryArms | None = None
+
+    def __post_init__(self) -> None:
+        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
+        for name in ("base", "moving"):
+            put(name, _joints(name, getattr(self, name)))
+        put("home", _home(self.home))
+        for name in ("unit", "name"):
+            if not isinstance(getattr(self, name), str):
+                raise PlatformError(f"{name}: expected text, found {getattr(self, name)!r}")
+        if self.legs not in get_args(LegKind):
+            kinds = ", ".join(get_args(LegKind))
+            raise PlatformError(f"legs: expected one of {kinds}; found {self.legs!r}")
+        if (self.legs == "rotary") != (self.rotary is not None):
+            need = "needs" if self.legs == "rotary" else "must not have"
+            raise PlatformError(f"rotary: a platform with {self.legs} legs {need} this table")
+        if self.pivot is not None:
+            put("pivot", platform_field("pivot", self.pivot, (3,)))
+        self._check_coincident_joints()
+        self._check_stroke(put)
+        self._check_workspace()
+
+    # ---- files ------------------------------------------------------------------------
+
+    @staticmethod
+    def load(name_or_path: str | Path) -> Platform:
+        """A catalog machine by name, or a platform from the path of a .toml file.
+
+        Raises:
+            PlatformError: no such name or file, or a field that is missing or wrong.
+        """
+        from gough.platform_toml import load
+
+        return load(name_or_path)
+
+    @staticmethod
+    def catalog() -> list[str]:
+        """Names of the machines that come with the package."""
+        from gough.platform_toml import catalog_names
+
+        return catalog_names()
+
+    def to_toml(self) -> str:
+        """This platform as TOML text; `load` of it gives an equal platform."""
+        from gough.platform_toml import to_toml
+
+        return to_toml(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write `to_toml()` to a file, which appears whole or not at all."""
+        from gough.platform_toml import save
+
+        save(self, path)
+
+    # ---- derived ----------------------------------------------------------------------
+
+    @cached_property
+    def pivot_point(self) -> Array:
+        """The pivot, zero where none is given, (3,)."""
+        return np.zeros(3) if self.pivot is None else self.pivot
+
+    @cached_property
+    def home_lengths(self) -> Array:
+        """Distance between the two joints of each leg at home, (6,) [platform unit]."""
+        from gough.kinematics import strut_vectors
+
+        return np.linalg.norm(strut_vectors(self, self.home), axis=-1)
+
+    @cached_property
+    def home_legs(self) -> Array:
+        """Readings at home, (6,): lengths, zeros (length_change) or angles [rad]."""
+        from gough.kinematics import leg_lengths
+
+        return leg_lengths(self, self.home)
+
+    @cached_property
+    def size(self) -> float:
+        """The largest distance between two joints at home: what tolerances are relative to."""
+        points = np.vstack([self.base, self._moving_at_home()])
+        return float(max(np.linalg.norm(a - b) for a, b in combinations(points, 2)))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over all that affects kinematics, seeds and statuses (not the name)."""
+        facts = self.to_dict()
+        facts.pop("name")
+        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+    def to_dict(self) -> dict:
+        """Plain lists, numbers and text: the tables of the TOML file."""
+        out: dict = {"name": self.name, "unit": self.unit, "legs": self.legs}
+        out |= {"base": self.base.tolist(), "moving": self.moving.tolist()}
+        for key in ("pivot", "stroke"):
+            if getattr(self, key) is not None:
+                out[key] = getattr(self, key).tolist()
+        out["home"] = {"position": self.home.position.tolist(), "wxyz": self.home.wxyz.tolist()}
+        for key in ("workspace", "rotary"):
+            part = getattr(self, key)
+            if part is not None:
+                out[key] = {
+                    k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(part).items()
+                }
+        return out
+
+    def with_workspace(self, translation: ArrayLike, rotation_deg: ArrayLike) -> Platform:
+        """The same machine meant for other poses; arguments as `Workspace.about_home`."""
+        return replace(self, workspace=Workspace.about_home(translation, rotation_deg))
+
+    def with_origin_at(self, point: ArrayLike) -> Platform:
+        """The same machine whose poses tell where `point` (3,) of the platform is.
+
+        A tool tip, a mirror's vertex, a camera: positions in the answers become that point's,
+        in base coordinates, and the pose still rotates about it.
+        """
+        p = platform_field("point", point, (3,))
+        if self.pivot is not None:
+            raise PlatformError("pivot: a platform has a pivot or a moved origin, not both")
+        home = Pose(self.home.apply(p), self.home.wxyz)
+        return replace(self, moving=self.moving - p, home=home)
+
+    # ---- workspace --------------------------------------------------------------------
+
+    def sample_poses(self, count: int, seed: int = 0) -> Pose:
+        """Poses drawn evenly from the workspace's box, batch (count,), from a fixed seed.
+
+        Raises:
+            PlatformError: the platform states no workspace.
+        """
+        return self._workspace().sample(self.home, count, seed)
+
+    def in_workspace(self, pose: Pose) -> NDArray[np.bool_]:
+        """Whether poses (...) are in the workspace; True where none is stated.
+
+        The box is widened by 1e-9 of the platform's size, so that poses on its faces count
+        as inside in spite of rounding.
+        """
+        if self.workspace is None:
+            return np.ones(pose.batch, dtype=bool)
+        return self.workspace.contains(self.home, pose, 1e-9 * self.size, 1e-9)
+
+    def _workspace(self) -> Workspace:
+        if self.workspace is None:
+            raise PlatformError(
+                f"workspace: platform {self.name!r} states none; add a [workspace] table or call "
+                "with_workspace(translation, rotation_deg)"
+            )
+        return self.workspace
+
+    # ---- checks -----------------------------------------------------------------------
+
+    def _moving_at_home(self) -> Array:
+        return self.home.apply(self.moving - self.pivot_point) + self.pivot_point
+
+    def _check_coincident_joints(self) -> None:
+        at_home = self._moving_at_home()
+        for i, j in combinations(range(6), 2):
+            gaps = [np.linalg.norm(p[i] - p[j]) for p in (self.base, self.moving)]
+            if max(gaps) <= COINCIDENT * self.size:
+                raise PlatformError(
+                    f"base[{i}], base[{j}] and moving[{i}], moving[{j}]: legs {i + 1} and {j + 1} "
+                    "share both joints, so they are one leg; expected six different legs"
+                )
+        for name, points in (("base", self.base), ("moving", self.moving)):
+            spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+            if spread[1] <= COINCIDENT * self.size:
+                raise PlatformError(
+                    f"{name}: all six joints lie on one line, about which the platform would turn "
+                    "freely; expected joints that span a plane"
+                )
+        if self.legs != "rotary":
+            for i in range(6):
+                if np.linalg.norm(at_home[i] - self.base[i]) <= COINCIDENT * self.size:
+                    raise PlatformError(
+                        f"home: leg {i + 1} has length 0 there: base[{i}] and moving[{i}] are at "
+                        f"the same point {self.base[i].tolist()}"
+                    )
+
+    def _check_stroke(self, put) -> None:
+        what = "motor angles" if self.legs == "rotary" else "leg readings"
+        home = self.home_legs
+        if not np.all(np.isfinite(home)):
+            leg = int(np.argmin(np.isfinite(home)))
+            raise PlatformError(
+                f"home: the arm and rod of leg {leg + 1} cannot reach the home pose; check home, "
+                "rotary.arm_length and rotary.rod_length"
+            )
+        if self.stroke is None:
+            return
+        limits = platform_numbers("stroke", self.stroke)
+        if limits.shape not in ((2,), (6, 2)):
+            raise PlatformError(
+                f"stroke: expected [lowest, highest] or six such pairs, got shape {limits.shape}"
+            )
+        limits = np.array(np.broadcast_to(limits, (6, 2)))
+        put("stroke", limits)
+        for i, (low, high) in enumerate(limits):
+            if not low < high:
+                raise PlatformError(
+                    f"stroke[{i}]: expected lowest below highest, found [{low}, {high}]"
+                )
+            if not low <= home[i] <= high:
+                raise PlatformError(
+                    f"stroke[{i}]: forbids the home pose: {what} at home are {home[i]:.6g}, "
+                    f"allowed are {low:.6g} to {high:.6g}; change home or stroke"
+                )
+
+    def _check_workspace(self) -> None:
+        if self.workspace is not None and not isinstance(self.workspace, Workspace):
+            raise PlatformError(f"workspace: expected a Workspace, found {self.workspace!r}")
+
+    # ---- identity ---------------------------------------------------------------------
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Platform):
+            return NotImplemented
+        return self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        unit = self.unit or "unit not named"
+        return f"Platform({self.name!r}, {self.legs} legs, size {self.size:.4g} [{unit}])"
+
+
+def _joints(name: str, value: ArrayLike) -> Array:
+    array = platform_numbers(name, value)
+    if array.ndim == 2 and array.shape[1] == 3 and len(array) != 6:
+        raise PlatformError(f"{name}: expected 6 joints, one for each leg, found {len(array)}")
+    return platform_field(name, value, (6, 3))
+
+
+def _home(value: Pose | ArrayLike) -> Pose:
+    pose = value if isinstance(value, Pose) else Pose(platform_field("home", value, (3,)))
+    if pose.batch:
+        raise PlatformError(f"home: expected one pose, found batch axes {pose.batch}")
+    return Pose(
+        platform_field("home.position", pose.position, (3,)), platform_field("home.wxyz", pose.wxyz, (4,))
+    )

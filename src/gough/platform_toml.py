@@ -1,0 +1,169 @@
+"""Platforms as TOML text: read, written, and the catalog of known machines."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import tempfile
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from gough.checks import platform_field
+from gough.errors import GoughError, PlatformError
+from gough.platform import Platform
+from gough.pose import Pose
+from gough.rotary import RotaryArms
+from gough.workspace import Workspace
+
+REQUIRED = ("base", "moving", "home")
+OPTIONAL = ("name", "unit", "legs", "stroke", "pivot", "workspace", "rotary")
+TABLES = {
+    "home": ("position", "wxyz", "euler_deg"),
+    "workspace": ("translation", "rotation_deg"),
+    "rotary": ("arm_length", "rod_length", "axis_x", "axis_y", "branch"),
+}
+
+
+def catalog_names() -> list[str]:
+    """Names of the machines that come with the package, sorted."""
+    files = resources.files("gough").joinpath("catalog").iterdir()
+    return sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml"))
+
+
+def catalog_text(name: str) -> str:
+    """The TOML of a catalog machine, comments and all.
+
+    Raises:
+        PlatformError: no such machine; the text lists those there are.
+    """
+    names = catalog_names()
+    if name not in names:
+        near = difflib.get_close_matches(name, names, n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise PlatformError(
+            f"no platform is called {name!r}; {hint}The catalog has: {', '.join(names)}. "
+            "The path of a platform of your own must end in .toml"
+        )
+    return resources.files("gough").joinpath("catalog", f"{name}.toml").read_text("utf-8")
+
+
+def load(name_or_path: str | Path) -> Platform:
+    """See `Platform.load`."""
+    text_name = str(name_or_path)
+    if not text_name.endswith(".toml"):
+        return from_toml(catalog_text(text_name), where=text_name)
+    path = Path(name_or_path)
+    try:
+        text = path.read_text("utf-8")
+    except UnicodeDecodeError:
+        raise PlatformError(f"{path}: not a text file; expected TOML") from None
+    except OSError as error:
+        raise PlatformError(f"{path}: cannot be read: {error.strerror}") from None
+    return from_toml(text, where=str(path))
+
+
+def from_toml(text: str, where: str = "platform") -> Platform:
+    """A platform from TOML text; errors begin with `where`."""
+    try:
+        return _from_dict(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise PlatformError(f"{where}: not valid TOML: {error}") from None
+    except GoughError as error:
+        raise PlatformError(f"{where}: {error}") from None
+
+
+def to_toml(platform: Platform) -> str:
+    """See `Platform.to_toml`."""
+    facts = platform.to_dict()
+    top = {k: v for k, v in facts.items() if not isinstance(v, dict)}
+    lines = [f"{key} = {_value(value)}" for key, value in top.items()]
+    for name, table in facts.items():
+        if isinstance(table, dict):
+            lines += ["", f"[{name}]", *(f"{k} = {_value(v)}" for k, v in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def save(platform: Platform, path: str | Path) -> None:
+    """See `Platform.save`."""
+    target = Path(path)
+    try:
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(to_toml(platform))
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, target)
+        except BaseException:
+            os.unlink(temporary)
+            raise
+    except OSError as error:
+        raise PlatformError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _from_dict(facts: dict) -> Platform:
+    for key in REQUIRED:
+        if key not in facts:
+            what = "a [home] table" if key == "home" else "six rows [x, y, z]"
+            raise PlatformError(f"{key}: missing; expected {what}")
+    _known("", facts, REQUIRED + OPTIONAL)
+    for name, keys in TABLES.items():
+        if name in facts:
+            if not isinstance(facts[name], dict):
+                raise PlatformError(
+                    f"{name}: expected a table with {', '.join(keys)}; found {facts[name]!r}"
+                )
+            _known(f"{name}.", facts[name], keys)
+    options = {k: facts[k] for k in ("name", "unit", "legs", "stroke", "pivot") if k in facts}
+    return Platform(
+        facts["base"],
+        facts["moving"],
+        _home(facts["home"]),
+        workspace=_table(Workspace, "workspace", facts),
+        rotary=_table(RotaryArms, "rotary", facts),
+        **options,
+    )
+
+
+def _table(kind, name: str, facts: dict):
+    """An instance of `kind` from the table `name`, all of whose keys must be there."""
+    if name not in facts:
+        return None
+    missing = [k for k in TABLES[name] if k not in facts[name]]
+    if missing:
+        raise PlatformError(f"{name}.{missing[0]}: missing; see the catalog for an example")
+    return kind(**facts[name])
+
+
+def _home(table: dict) -> Pose:
+    if "position" not in table:
+        raise PlatformError("home.position: missing; expected [x, y, z]")
+    position = platform_field("home.position", table["position"], (3,))
+    if "wxyz" in table and "euler_deg" in table:
+        raise PlatformError("home: give wxyz or euler_deg, not both")
+    if "euler_deg" in table:
+        angles = platform_field("home.euler_deg", table["euler_deg"], (3,))
+        return Pose.from_euler(position, np.radians(angles))
+    return Pose(position, platform_field("home.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,)))
+
+
+def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:
+    for key in table:
+        if key not in keys:
+            near = difflib.get_close_matches(key, keys, n=1)
+            hint = f"did you mean {prefix}{near[0]}? " if near else ""
+            raise PlatformError(f"{prefix}{key}: unknown field; {hint}Fields: {', '.join(keys)}")
+
+
+def _value(value: object) -> str:
+    """One TOML value; rows of numbers one to a line."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
+    if isinstance(value, list):
+        return "[" + ", ".join(repr(float(v)) for v in value) + "]"
+    return repr(value)

@@ -1,0 +1,54 @@
+"""The motor arms of a rotary (6-RSS) hexapod."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gough.checks import Array, platform_field
+from gough.errors import PlatformError
+
+
+@dataclass(frozen=True, eq=False)
+class RotaryArms:
+    """The motor arms of a 6-RSS hexapod. Base joint i is the tip of arm i,
+
+        tip_i(q_i) = base_i + arm_length (cos q_i axis_x_i + sin q_i axis_y_i),
+
+    and a rod of fixed length joins it to platform joint i.
+
+    Attributes:
+        arm_length: from the motor's axis to the tip [platform unit].
+        rod_length: between the two ball joints of a rod [platform unit].
+        axis_x: (6, 3) unit vectors, where the arm points at angle 0.
+        axis_y: (6, 3) unit vectors, where it points at angle +90 deg.
+        branch: (6,) of +1 or -1: which of the two motor angles that reach a pose is meant,
+            q = atan2(y, x) + branch * acos(...), with x, y along axis_x, axis_y.
+    """
+
+    arm_length: float
+    rod_length: float
+    axis_x: Array
+    axis_y: Array
+    branch: Array
+
+    def __post_init__(self) -> None:
+        for name in ("arm_length", "rod_length"):
+            value = float(platform_field(f"rotary.{name}", getattr(self, name), ()))
+            if value <= 0:
+                raise PlatformError(f"rotary.{name}: expected a length above 0, found {value}")
+            object.__setattr__(self, name, value)
+        for name, shape in (("axis_x", (6, 3)), ("axis_y", (6, 3)), ("branch", (6,))):
+            array = platform_field(f"rotary.{name}", getattr(self, name), shape)
+            object.__setattr__(self, name, array)
+        if not np.all(np.abs(self.branch) == 1):
+            found = self.branch.tolist()
+            raise PlatformError(f"rotary.branch: expected six of 1 or -1, found {found}")
+        for i in range(6):
+            x, y = self.axis_x[i], self.axis_y[i]
+            if max(abs(x @ x - 1), abs(y @ y - 1), abs(x @ y)) > 1e-6:
+                raise PlatformError(
+                    f"rotary.axis_x[{i}], axis_y[{i}]: expected two unit vectors at right "
+                    f"angles, found {x.tolist()} and {y.tolist()}"
+                )
