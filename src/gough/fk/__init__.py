@@ -1,0 +1,1 @@
+"""Forward kinematics: from leg readings to poses that say how far they can be trusted."""

@@ -1,0 +1,116 @@
+"""What is known about each solved row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gough.checks import Array
+from gough.pose import Pose
+
+
+class Status(IntEnum):
+    """The outcome of one row; `text` is a sentence that says what to do."""
+
+    CONVERGED = 0
+    OUTSIDE_STROKE = 1
+    NEAR_SINGULARITY = 2
+    OUTSIDE_WORKSPACE = 3
+    UNREACHABLE = 4
+    NOT_CONVERGED = 5
+    INVALID_INPUT = 6
+
+    @property
+    def text(self) -> str:
+        """A sentence a user can act on."""
+        return _TEXTS[self]
+
+    @property
+    def label(self) -> str:
+        """The word written to files, such as "outside_stroke"."""
+        return self.name.lower()
+
+    @property
+    def usable(self) -> bool:
+        """The pose has these legs and is, as far as is known, the machine's own."""
+        return self in USABLE
+
+
+USABLE = (Status.CONVERGED, Status.OUTSIDE_STROKE, Status.NEAR_SINGULARITY)
+
+_TEXTS = {
+    Status.CONVERGED: "The pose has these leg readings to within the tolerance.",
+    Status.OUTSIDE_STROKE: (
+        "The pose has these leg readings, but a reading is outside the stroke limits: check the "
+        "sensor's zero, the unit, or the limits in the platform file."
+    ),
+    Status.NEAR_SINGULARITY: (
+        "The pose has these leg readings, but is close to a singularity, where small reading "
+        "errors become large pose errors: treat its last digits with care, or move away."
+    ),
+    Status.OUTSIDE_WORKSPACE: (
+        "A pose has these leg readings, but it is outside the stated workspace or beyond a "
+        "singularity, so it is probably another assembly mode: pass a seed near the true pose, "
+        "or widen the workspace."
+    ),
+    Status.UNREACHABLE: (
+        "No pose was found that has these leg readings; the residual says by how much the "
+        "nearest misses: check the readings' unit, order and zero, and the platform's joints."
+    ),
+    Status.NOT_CONVERGED: (
+        "The iteration limit was reached before the tolerance: allow more iterations, pass a "
+        "seed closer to the pose, or ask for a wider tolerance."
+    ),
+    Status.INVALID_INPUT: (
+        "A reading is not a finite number, or a length is not above zero: correct the row."
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Poses with what is known about each.
+
+    Attributes:
+        pose: batch axes (...) as the legs had; NaN where the input was invalid.
+        status: (...) uint8, to be compared with `Status` members.
+        residual: (...) largest difference between a strut's length at the pose and the length
+            that its reading asks for [platform unit]; NaN where the input was invalid.
+        iterations: (...) int32, Newton steps taken, over all starts that were tried.
+        covariance: (..., 6, 6) pose covariance, see `gough.pose_covariance`, or None.
+    """
+
+    pose: Pose
+    status: NDArray[np.uint8]
+    residual: Array
+    iterations: NDArray[np.int32]
+    covariance: Array | None = None
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Rows (...) whose pose has these legs and is, as far as is known, the machine's."""
+        return np.isin(self.status, USABLE)
+
+    def counts(self) -> dict[Status, int]:
+        """How many rows have each status that occurs, in the order of `Status`."""
+        numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
+        return {s: int(numbers[s]) for s in Status if numbers[s]}
+
+    def __getitem__(self, index: object) -> Solution:
+        covariance = None if self.covariance is None else self.covariance[index]
+        return Solution(
+            self.pose[index], self.status[index], self.residual[index], self.iterations[index],
+            covariance,
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        if not self.pose.batch:
+            return (
+                f"Solution({Status(int(self.status)).label}, {self.pose!r}, "
+                f"residual={float(self.residual):.3g}, iterations={int(self.iterations)})"
+            )
+        found = ", ".join(f"{s.label}: {n}" for s, n in self.counts().items())
+        return f"Solution(batch {self.pose.batch}; {found})"
