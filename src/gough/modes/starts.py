@@ -1,0 +1,164 @@
+"""A start system for each machine: every complex pose for one set of complex readings.
+
+From the stored 40 solutions of a generic hexapod, first the base joints move to the
+machine's, then, with the roles of base and platform exchanged, the platform joints. Special
+machines lose solutions to infinity on the way (28 of the 40 remain for a symmetric planar
+hexapod, 16 for a 6-3); the rest are checked by loops and kept. From then on each set of
+readings moves six squared lengths (rotary legs: the arms' tips too), and no path leaves.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from gough.checks import Array
+from gough.kinematics import normalised_jacobian
+from gough.modes.follow import Parameters, follow
+from gough.modes.frames import Frames
+from gough.modes.monodromy import APART, CAREFUL, fill_up, gaussian
+from gough.modes.study import Complex, distances, distinct, inverse
+from gough.platform import Platform
+from gough.pose import Pose
+
+SEED = 5  # of all that is drawn here
+QUIET = 3  # loops that bring nothing new before a machine's list counts as complete
+CACHED = 64  # machines kept in memory
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """What a machine's readings are tracked from.
+
+    Attributes:
+        frames: the change to normalised coordinates.
+        at: the complex readings.
+        e, t: (P, 4), (P, 3) all finite complex poses for them; of each pair of mirror images
+            the first only, where `paired`.
+        paired: whether poses come as mirror images (planar base and platform).
+        count: finite complex poses, mirror images included.
+        singular: the machine is architecturally singular, and has no start.
+        history: how many poses were known after each step of the search, from the 40.
+    """
+
+    frames: Frames
+    at: Parameters
+    e: Complex
+    t: Complex
+    paired: bool
+    count: int
+    singular: bool
+    history: tuple[int, ...]
+
+
+_known: OrderedDict[str, Start] = OrderedDict()
+
+
+def start_of(platform: Platform) -> Start:
+    """The machine's start system, from memory if it was found before."""
+    key = platform.digest
+    if key not in _known:
+        _known[key] = find_start(platform)
+        while len(_known) > CACHED:
+            _known.popitem(last=False)
+    _known.move_to_end(key)
+    return _known[key]
+
+
+@cache
+def generic() -> tuple[Parameters, Complex, Complex]:
+    """The stored hexapod with 40 solutions; made by tools/start_system.py."""
+    with resources.files("gough.modes").joinpath("start_system.npz").open("rb") as file:
+        with np.load(file) as stored:
+            at = Parameters(stored["base"], stored["moving"], stored["squares"])
+            return at, stored["e"], stored["t"]
+
+
+def find_start(platform: Platform, seed: int = SEED) -> Start:
+    """Track the 40 generic solutions to the machine; see the module's text."""
+    frames = Frames.of(platform)
+    rng = np.random.default_rng(seed)
+    corner = _family(platform, frames)
+    squares, base = corner(rng)
+    at = Parameters(base, frames.moving.astype(complex), squares)
+    if architecturally_singular(platform):
+        none = np.zeros((0, 4), complex), np.zeros((0, 3), complex)
+        return Start(frames, at, *none, False, 0, True, (40, 0))
+    e, t, history = _from_generic(at, rng)
+    (e, t), loops = fill_up((e, t), at, corner, rng, QUIET)
+    count = len(e)
+    paired = frames.mirror is not None
+    if paired:
+        first = _first_of_pairs(frames, e, t)
+        paired = 2 * len(first) == count
+        e, t = (e[first], t[first]) if paired else (e, t)
+    return Start(frames, at, e, t, paired, count, False, (*history, *loops))
+
+
+def architecturally_singular(platform: Platform) -> bool:
+    """Whether the six legs are dependent at every pose, so that readings never fix a pose.
+
+    Tried at eight random poses, at none of which other machines are singular.
+    """
+    rng = np.random.default_rng(SEED)
+    if platform.rotary is not None:
+        return False
+    shift = rng.normal(size=(8, 3)) * platform.size
+    pose = Pose(shift, rng.normal(size=(8, 4)))
+    values = np.linalg.svd(normalised_jacobian(platform, pose), compute_uv=False)
+    return bool(np.all(values[:, -1] < 1e-9 * values[:, 0]))
+
+
+def _family(platform: Platform, frames: Frames):
+    """A function that draws complex readings of this machine: squares (6,), base (6, 3)."""
+    if platform.rotary is None:
+        typical = float(np.mean(frames.squares(platform.home_lengths)))
+        fixed = frames.base(platform.base).astype(complex)
+        return lambda rng: (typical * (1 + SPREAD * gaussian(rng, 6)), fixed)
+    arms = platform.rotary
+    typical = (arms.rod_length / frames.scale) ** 2
+    centre = frames.base(platform.base)
+    tips = [frames.base(platform.base + arms.arm_length * a) for a in (arms.axis_x, arms.axis_y)]
+
+    def draw(rng: np.random.Generator) -> tuple[Complex, Complex]:
+        # arms of complex direction and length: the family in which readings are points
+        x, y = gaussian(rng, 6, 1), gaussian(rng, 6, 1)
+        base = centre + x * (tips[0] - centre) + y * (tips[1] - centre)
+        return typical * (1 + SPREAD * gaussian(rng, 6)), base
+
+    return draw
+
+
+SPREAD = 0.7  # of the complex squared lengths about those at home
+
+
+def _from_generic(at: Parameters, rng: np.random.Generator) -> tuple[Complex, Complex, list[int]]:
+    """Finite poses at `at`: base joints first, then platform joints, from the stored 40."""
+    origin, e, t = generic()
+    squares = gaussian(rng, 6) * np.mean(np.abs(at.squares))
+    half = follow((e, t), origin, squares[None], at.base[None], share=CAREFUL).finite()
+    here = Parameters(origin.moving, at.base, squares)  # roles exchanged
+    ends = follow(inverse(*half), here, at.squares[None], at.moving[None], share=CAREFUL)
+    e, t = inverse(*ends.finite())
+    near = np.abs(t).max(axis=1, initial=0.0) < FAR
+    e, t = e[near], t[near]
+    kept = distinct(e, t, APART)
+    return e[kept], t[kept], [len(generic()[1]), len(half[0]), len(kept)]
+
+
+FAR = 1e6  # normalised distance beyond which an end is at infinity
+
+
+def _first_of_pairs(frames: Frames, e: Complex, t: Complex) -> Array:
+    """Indices of one pose of each pair of mirror images."""
+    gaps = distances((e, t), frames.reflect(e, t))
+    first: list[int] = []
+    for i in range(len(e)):
+        j = int(np.argmin(gaps[i]))
+        if gaps[i, j] < APART and j > i:
+            first.append(i)
+    return np.array(first, dtype=np.int64)
