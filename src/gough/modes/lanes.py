@@ -76,11 +76,30 @@ class _Arithmetic(AbstractTemplate):
         if len(args) == 2 and lanes in args:
             if all(a in (lanes, types.float64, types.complex128) for a in args):
                 return signature(lanes, *args)
+        elif len(args) == 2 and _vector in args:
+            if all(a in (_vector, types.float64) for a in args):
+                return signature(_vector, *args)
         return None
 
 
-for _op in (operator.add, operator.sub, operator.mul, operator.iadd, operator.isub):
+for _op in (operator.add, operator.sub, operator.mul, operator.truediv):
     infer_global(_op)(type(f"_{_op.__name__}", (_Arithmetic,), {}))
+
+
+def _real(instruction: str):
+    """Lower an instruction for vectors of eight reals, either of which may be one double."""
+
+    def lower(context, builder, sig, args):
+        pairs = zip(sig.args, args, strict=True)
+        a, b = (v if kind == _vector else _splat(builder, v) for kind, v in pairs)
+        return getattr(builder, instruction)(a, b, flags=_FLAGS)
+
+    return lower
+
+
+for _op, _name in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
+    for _kinds in ((_VectorType,) * 2, (_VectorType, types.Float), (types.Float, _VectorType)):
+        lower_builtin(getattr(operator, _op), *_kinds)(_real(_name))
 
 
 def _add(context, builder, sig, args):
@@ -117,9 +136,7 @@ def _scale_complex(context, builder, sig, args):
 
 
 lower_builtin(operator.add, LanesType, LanesType)(_add)
-lower_builtin(operator.iadd, LanesType, LanesType)(_add)
 lower_builtin(operator.sub, LanesType, LanesType)(_sub)
-lower_builtin(operator.isub, LanesType, LanesType)(_sub)
 lower_builtin(operator.mul, LanesType, LanesType)(_mul)
 lower_builtin(operator.mul, LanesType, types.Float)(_scale)
 lower_builtin(operator.mul, types.Float, LanesType)(_scale)
@@ -201,3 +218,54 @@ def ones(typingctx):
         return _make(context, builder, re, im)
 
     return lanes(), codegen
+
+
+@intrinsic
+def get_real(typingctx, z, slot):
+    """Eight real numbers: entries 8 slot to 8 slot + 7 of the flat float64 array z."""
+
+    def codegen(context, builder, sig, args):
+        return builder.load(_real_pointer(context, builder, sig.args[0], *args), align=8)
+
+    return _vector(z, types.int64), codegen
+
+
+@intrinsic
+def put_real(typingctx, z, slot, value):
+    """Write eight real numbers to entries 8 slot to 8 slot + 7 of the flat float64 array z."""
+
+    def codegen(context, builder, sig, args):
+        pointer = _real_pointer(context, builder, sig.args[0], args[0], args[1])
+        builder.store(args[2], pointer, align=8)
+        return context.get_dummy_value()
+
+    return types.void(z, types.int64, _vector), codegen
+
+
+def _real_pointer(context, builder, array_type, array, slot):
+    data = context.make_array(array_type)(context, builder, array).data
+    first = builder.mul(slot, slot.type(LANES))
+    return builder.bitcast(builder.gep(data, [first]), _VECTOR.as_pointer())
+
+
+@intrinsic
+def root(typingctx, value):
+    """Square roots of eight reals."""
+
+    def codegen(context, builder, sig, args):
+        kind = ir.FunctionType(_VECTOR, [_VECTOR])
+        name = f"llvm.sqrt.v{LANES}f64"
+        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        return builder.call(function, args)
+
+    return _vector(_vector), codegen
+
+
+@intrinsic
+def larger(typingctx, a, b):
+    """The larger of each two of eight reals; b where they do not compare."""
+
+    def codegen(context, builder, sig, args):
+        return builder.select(builder.fcmp_ordered(">", *args), *args)
+
+    return _vector(_vector, _vector), codegen
