@@ -10,7 +10,7 @@ readings moves six squared lengths (rotary legs: the arms' tips too), and no pat
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 
@@ -41,6 +41,7 @@ class Start:
             the first only, where `paired`.
         paired: whether poses come as mirror images (planar base and platform).
         count: finite complex poses, mirror images included.
+        base_moves: whether readings move the base joints too (rotary legs).
         singular: the machine is architecturally singular, and has no start.
         history: how many poses were known after each step of the search, from the 40.
     """
@@ -51,6 +52,7 @@ class Start:
     t: Complex
     paired: bool
     count: int
+    base_moves: bool
     singular: bool
     history: tuple[int, ...]
 
@@ -67,6 +69,24 @@ def start_of(platform: Platform) -> Start:
             _known.popitem(last=False)
     _known.move_to_end(key)
     return _known[key]
+
+
+def second_start(start: Start) -> Start:
+    """The same solutions carried to other complex readings: other paths to the same targets."""
+    key = id(start)
+    if key not in _second or _second[key][0] is not start:
+        rng = np.random.default_rng(SEED + 1)
+        squares = start.at.squares * np.exp(0.5j * rng.normal(size=6))
+        ends = follow((start.e, start.t), start.at, squares[None], share=CAREFUL)
+        e, t = ends.finite()
+        whole = len(e) == len(start.e) == len(distinct(e, t, APART))
+        at = Parameters(start.at.base, start.at.moving, squares)
+        _second.clear()
+        _second[key] = start, replace(start, at=at, e=e, t=t) if whole else start
+    return _second[key][1]
+
+
+_second: dict[int, tuple[Start, Start]] = {}
 
 
 @cache
@@ -87,7 +107,7 @@ def find_start(platform: Platform, seed: int = SEED) -> Start:
     at = Parameters(base, frames.moving.astype(complex), squares)
     if architecturally_singular(platform):
         none = np.zeros((0, 4), complex), np.zeros((0, 3), complex)
-        return Start(frames, at, *none, False, 0, True, (40, 0))
+        return Start(frames, at, *none, False, 0, False, True, (40, 0))
     e, t, history = _from_generic(at, rng)
     (e, t), loops = fill_up((e, t), at, corner, rng, QUIET)
     count = len(e)
@@ -96,7 +116,8 @@ def find_start(platform: Platform, seed: int = SEED) -> Start:
         first = _first_of_pairs(frames, e, t)
         paired = 2 * len(first) == count
         e, t = (e[first], t[first]) if paired else (e, t)
-    return Start(frames, at, e, t, paired, count, False, (*history, *loops))
+    moves = platform.rotary is not None
+    return Start(frames, at, e, t, paired, count, moves, False, (*history, *loops))
 
 
 def architecturally_singular(platform: Platform) -> bool:

@@ -1,0 +1,225 @@
+"""Every assembly mode of a hexapod: all real poses that six readings allow."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gough.checks import Array, as_batch
+from gough.kinematics import equivalent_struts
+from gough.modes.certificate import certify
+from gough.modes.finish import REAL, finish_rows
+from gough.modes.follow import SHARE, follow
+from gough.modes.frames import Frames
+from gough.modes.result import AssemblyModes, ModesStatus
+from gough.modes.singular import curve_of_poses, merge, poses_near
+from gough.modes.starts import SEED, Start, second_start, start_of
+from gough.modes.tracker import FINITE
+from gough.platform import Platform
+
+CHUNK = 128  # sets of readings per task
+CAREFUL_SHARES = (0.2, 0.1)  # of the radius of convergence, for readings that need another try
+TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the legs
+FAR = 1e3  # normalised distance beyond which a path that does not arrive goes to infinity
+
+
+def assembly_modes(
+    platform: Platform, legs: ArrayLike, *, threads: int | None = None
+) -> AssemblyModes:
+    """All real poses for leg readings, each with a certificate, and whether the list is complete.
+
+    All complex solutions are tracked from the machine's start system (found on its first use,
+    some hundredths of a second), so nothing depends on a guess. The same call gives the same
+    bits, whatever the number of threads and whatever other readings are beside.
+
+    Args:
+        legs: readings (6,) or (N, 6) of any kind of leg.
+        threads: at most so many; all the process may use if None.
+
+    Raises:
+        GoughError: legs of another shape, or not numbers. Rows with NaN or infinity are
+            answered with no poses and the status INVALID_INPUT.
+    """
+    readings = as_batch("legs", legs, (6,))
+    rows = readings.reshape(-1, 6)
+    start = start_of(platform)
+    base, lengths = equivalent_struts(platform, rows)
+    valid = np.all(np.isfinite(rows), axis=1) & np.all(lengths > 0, axis=1)
+    work = _Work(start, base if platform.rotary is not None else base[:1], lengths)
+    outcome = _Outcome.empty(len(rows))
+    outcome.status[~valid] = ModesStatus.INVALID_INPUT
+    todo = np.flatnonzero(valid)
+    if start.singular:
+        _curves(platform, work, todo, outcome)
+    else:
+        _run(work, todo, outcome, threads)
+    return _assemble(platform, readings, start, outcome)
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """Readings in the platform's units, to be tracked from `start`."""
+
+    start: Start
+    base: Array  # (N or 1, 6, 3)
+    lengths: Array  # (N, 6)
+
+    def normalised(self, rows: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Base joints (n or 1, 6, 3) and squared lengths (n, 6) of some rows."""
+        frames: Frames = self.start.frames
+        base = self.base if len(self.base) == 1 else self.base[rows]
+        return frames.base(base), frames.squares(self.lengths[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """Per row: status, counts of paths, normalised real poses."""
+
+    status: NDArray[np.uint8]
+    paths: NDArray[np.int32]  # (N, 4): real, complex, at infinity, singular
+    poses: list[tuple[Array, Array]]
+    multiple: list[NDArray[np.int32]]
+
+    @classmethod
+    def empty(cls, count: int) -> _Outcome:
+        none = (np.zeros((0, 4)), np.zeros((0, 3)))
+        return cls(
+            np.zeros(count, np.uint8), np.zeros((count, 4), np.int32), [none] * count,
+            [np.zeros(0, np.int32)] * count,
+        )  # fmt: skip
+
+
+def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int | None) -> None:
+    """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
+    chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
+    workers = min(len(chunks), threads or len(os.sched_getaffinity(0)))
+    run = lambda chunk: _solve(work, chunk, outcome)  # noqa: E731
+    if workers <= 1:
+        left = [run(chunk) for chunk in chunks]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            left = list(pool.map(run, chunks))
+    for row in np.concatenate([*left, np.zeros(0, np.int64)]).astype(int):
+        _solve_again(work, row, outcome)
+
+
+def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float):
+    """Paths from `start` to some rows, and their real ends."""
+    base, squares = work.normalised(rows)
+    moves = base.astype(complex) if len(work.base) > 1 or work.start.base_moves else None
+    ends = follow((start.e, start.t), start.at, squares.astype(complex), moves, share=share)
+    shape = ends.ends.shape
+    e, t = np.zeros((*shape, 4)), np.zeros((*shape, 3))
+    kind, clean = np.zeros(shape, np.uint8), np.zeros(len(rows), np.bool_)
+    finish_rows(
+        start.frames.moving, np.ascontiguousarray(base), np.ascontiguousarray(squares),
+        ends.e, ends.t, ends.ends, TOLERANCE, e, t, kind, clean,
+    )  # fmt: skip
+    return ends, e, t, kind, clean
+
+
+def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
+    """Track a chunk; returns the rows that were not clean."""
+    start = work.start
+    _, e, t, kind, clean = _track(work, rows, start, SHARE)
+    for k in np.flatnonzero(clean):
+        real = kind[k] == REAL
+        _record(start, outcome, rows[k], e[k][real], t[k][real])
+    return rows[~clean]
+
+
+def _record(start: Start, outcome: _Outcome, row: int, e: Array, t: Array) -> None:
+    """All paths of a row arrived apart: its real poses, with their mirror images."""
+    if start.paired:
+        mirrored = start.frames.reflect(e, t)
+        e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
+    outcome.poses[row] = e, t
+    outcome.multiple[row] = np.ones(len(e), np.int32)
+    outcome.paths[row] = len(e), start.count - len(e), 0, 0
+    outcome.status[row] = ModesStatus.COMPLETE
+
+
+def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
+    """Shorter steps, then another start; what is still not clean is singular or at infinity."""
+    starts = [work.start, second_start(work.start)]
+    tries = []
+    for share in CAREFUL_SHARES:
+        for start in starts:
+            ends, e, t, kind, clean = _track(work, np.array([row]), start, share)
+            if clean[0]:
+                real = kind[0] == REAL
+                _record(start, outcome, row, e[0][real], t[0][real])
+                return
+            tries.append((ends, e[0], t[0], kind[0]))
+    ends, e, t, kind = max(tries, key=lambda one: np.sum(one[0].ends == FINITE))
+    _record_singular(work, row, outcome, ends, e, t, kind)
+
+
+def _record_singular(work: _Work, row: int, outcome: _Outcome, ends, e, t, kind) -> None:
+    """Regular poses, and those that the paths which came together were heading for."""
+    start = work.start
+    base, squares = work.normalised(np.array([row]))
+    finite = ends.ends[0] == FINITE
+    far = ~finite & (np.abs(ends.t[0]).max(axis=1) > FAR)
+    found = poses_near(
+        start.frames.moving, base[0], squares[0], (ends.e[0][~far], ends.t[0][~far]), TOLERANCE
+    )
+    e, t, multiple = found.e, found.t, found.paths
+    if start.paired:
+        e, t, multiple = _with_mirrors(start, e, t, multiple)
+    twice = 2 if start.paired else 1
+    away = int(np.sum(far)) * twice
+    real, bad = int(multiple[multiple == 1].sum()), int(multiple[multiple > 1].sum())
+    bad += found.unresolved * twice
+    outcome.poses[row], outcome.multiple[row] = (e, t), multiple
+    outcome.paths[row] = real, max(0, start.count - real - bad - away), away, bad
+    if found.curve:
+        outcome.status[row] = ModesStatus.SELF_MOTION
+    elif found.unresolved:
+        outcome.status[row] = ModesStatus.INCOMPLETE
+    elif np.any(multiple > 1):
+        outcome.status[row] = ModesStatus.SINGULAR
+    else:
+        outcome.status[row] = ModesStatus.COMPLETE
+
+
+def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> None:
+    """Samples of a curve of poses for each row of an architecturally singular machine."""
+    frames = work.start.frames
+    home = frames.normal(platform.home)
+    for row in rows:
+        base, squares = work.normalised(np.array([row]))
+        e, t = curve_of_poses(frames.moving, base[0], squares[0], home, TOLERANCE, SEED)
+        outcome.poses[row], outcome.multiple[row] = (e, t), np.zeros(len(e), np.int32)
+        outcome.status[row] = ModesStatus.ALWAYS_SINGULAR
+
+
+def _with_mirrors(start: Start, e: Array, t: Array, multiple: NDArray[np.int32]):
+    """Mirror images added; a flat pose is its own, and counts twice."""
+    other = start.frames.reflect(e, t)
+    both = np.concatenate([e, other[0]]), np.concatenate([t, other[1]])
+    return merge(*both, np.concatenate([multiple, multiple]))
+
+
+def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) -> AssemblyModes:
+    """Poses in the platform's coordinates, certified, nearest to home first in each row."""
+    counts = np.array([len(e) for e, _ in outcome.poses], dtype=np.int64)
+    row = np.repeat(np.arange(len(counts)), counts)
+    e = np.concatenate([*(e for e, _ in outcome.poses), np.zeros((0, 4))])
+    t = np.concatenate([*(t for _, t in outcome.poses), np.zeros((0, 3))])
+    multiple = np.concatenate([*outcome.multiple, np.zeros(0, np.int32)]).astype(np.int32)
+    pose = start.frames.pose(e, t)
+    shift, turn = pose.distance(platform.home)
+    order = np.lexsort((shift / platform.size + turn, row))
+    row, pose, multiple = row[order], pose[order], multiple[order]
+    rows = legs.reshape(-1, 6)
+    proof = certify(platform, rows[row], pose)
+    return AssemblyModes(
+        platform=platform, legs=legs, pose=pose, row=row, multiplicity=multiple,
+        certificate=proof, status=outcome.status.reshape(legs.shape[:-1]),
+        paths=outcome.paths.reshape(*legs.shape[:-1], 4), solutions=start.count,
+    )  # fmt: skip
