@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array, as_batch
 from gough.kinematics import equivalent_struts
 from gough.modes.certificate import certify
-from gough.modes.finish import REAL, finish_rows
+from gough.modes.finish import FAR, REAL, finish_rows
 from gough.modes.follow import SHARE, follow
 from gough.modes.frames import Frames
 from gough.modes.result import AssemblyModes, ModesStatus
@@ -24,7 +24,6 @@ from gough.platform import Platform
 CHUNK = 128  # sets of readings per task
 CAREFUL_SHARES = (0.2, 0.1)  # of the radius of convergence, for readings that need another try
 TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the legs
-FAR = 1e3  # normalised distance beyond which a path that does not arrive goes to infinity
 
 
 def assembly_modes(
@@ -125,21 +124,25 @@ def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float):
 def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
     """Track a chunk; returns the rows that were not clean."""
     start = work.start
-    _, e, t, kind, clean = _track(work, rows, start, SHARE)
+    ends, e, t, kind, clean = _track(work, rows, start, SHARE)
+    away = np.sum(ends.ends != FINITE, axis=1)
     for k in np.flatnonzero(clean):
         real = kind[k] == REAL
-        _record(start, outcome, rows[k], e[k][real], t[k][real])
+        _record(start, outcome, rows[k], e[k][real], t[k][real], int(away[k]))
     return rows[~clean]
 
 
-def _record(start: Start, outcome: _Outcome, row: int, e: Array, t: Array) -> None:
-    """All paths of a row arrived apart: its real poses, with their mirror images."""
+def _record(
+    start: Start, outcome: _Outcome, row: int, e: Array, t: Array, away: int
+) -> None:
+    """All paths of a row arrived apart, or left: its real poses, with their mirror images."""
     if start.paired:
+        away *= 2
         mirrored = start.frames.reflect(e, t)
         e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
     outcome.poses[row] = e, t
     outcome.multiple[row] = np.ones(len(e), np.int32)
-    outcome.paths[row] = len(e), start.count - len(e), 0, 0
+    outcome.paths[row] = len(e), start.count - len(e) - away, away, 0
     outcome.status[row] = ModesStatus.COMPLETE
 
 
@@ -152,7 +155,8 @@ def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
             ends, e, t, kind, clean = _track(work, np.array([row]), start, share)
             if clean[0]:
                 real = kind[0] == REAL
-                _record(start, outcome, row, e[0][real], t[0][real])
+                away = int(np.sum(ends.ends != FINITE))
+                _record(start, outcome, row, e[0][real], t[0][real], away)
                 return
             tries.append((ends, e[0], t[0], kind[0]))
     ends, e, t, kind = max(tries, key=lambda one: np.sum(one[0].ends == FINITE))

@@ -15,6 +15,7 @@ from gough.modes.tracker import FINITE
 COMPLEX, REAL, DOUBTFUL = 0, 1, 2  # kinds of ends; DOUBTFUL: close to real, Newton undecided
 NEAR_REAL = 1e-3  # imaginary part over size from which an end is complex beyond doubt
 SAME = 1e-6  # difference of complex poses over their size below which they are one
+FAR = 1e3  # normalised distance beyond which a path that does not arrive goes to infinity
 STEPS = 8  # of Newton at most, with residuals that still fall
 
 
@@ -196,7 +197,10 @@ def _same(e, t, f, u):
 
 @jit()
 def finish_rows(p, base, squares, e, t, ends, tolerance, out_e, out_t, kind, clean):
-    """`real_ends` for N sets of readings; clean (N,): all paths arrived, apart, no doubt."""
+    """`real_ends` for N sets of readings.
+
+    clean (N,): all paths arrived, apart, without doubt, or are on their way to infinity.
+    """
     for row in range(squares.shape[0]):
         real_ends(
             p, base[row % base.shape[0]], squares[row], e[row], t[row], ends[row], tolerance,
@@ -204,5 +208,13 @@ def finish_rows(p, base, squares, e, t, ends, tolerance, out_e, out_t, kind, cle
         )  # fmt: skip
         clean[row] = not repeated(e[row], t[row], ends[row])
         for k in range(e.shape[1]):
-            if ends[row, k] != FINITE or kind[row, k] == DOUBTFUL:
-                clean[row] = False
+            if ends[row, k] == FINITE:
+                clean[row] = clean[row] and kind[row, k] != DOUBTFUL
+            else:
+                clean[row] = clean[row] and is_far(t[row, k])
+
+
+@jit()
+def is_far(t):
+    """Whether a path that did not arrive was going to infinity, and so to no pose."""
+    return max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR

@@ -18,7 +18,7 @@ from gough.modes.study import Complex
 NEAR = 0.1  # imaginary part over size up to which an end might belong to a real pose
 STEPS = 80  # of Gauss and Newton; at a double solution each halves the distance
 SMALL = 1e-5  # singular value over the largest, below which a pose counts as singular
-TOGETHER = 1e-4  # distance of refined poses that are one multiple solution
+TOGETHER = 3e-6  # distance of refined poses that are one multiple solution
 CURVE_STEP = 0.02  # between the points of a curve of poses
 CURVE_POINTS = 3000  # at most
 SAMPLES = 36  # poses that stand for a curve in an answer

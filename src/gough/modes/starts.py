@@ -27,6 +27,8 @@ from gough.pose import Pose
 
 SEED = 5  # of all that is drawn here
 QUIET = 3  # loops that bring nothing new before a machine's list counts as complete
+SPREAD = 0.5  # of complex readings about those at home
+FAR = 1e6  # normalised distance beyond which an end is at infinity
 CACHED = 64  # machines kept in memory
 
 
@@ -145,16 +147,15 @@ def _family(platform: Platform, frames: Frames):
     centre = frames.base(platform.base)
     tips = [frames.base(platform.base + arms.arm_length * a) for a in (arms.axis_x, arms.axis_y)]
 
+    cos, sin = np.cos(platform.home_legs)[:, None], np.sin(platform.home_legs)[:, None]
+
     def draw(rng: np.random.Generator) -> tuple[Complex, Complex]:
-        # arms of complex direction and length: the family in which readings are points
-        x, y = gaussian(rng, 6, 1), gaussian(rng, 6, 1)
+        # arms of complex direction and length: a linear family that holds all readings
+        x, y = cos + SPREAD * gaussian(rng, 6, 1), sin + SPREAD * gaussian(rng, 6, 1)
         base = centre + x * (tips[0] - centre) + y * (tips[1] - centre)
         return typical * (1 + SPREAD * gaussian(rng, 6)), base
 
     return draw
-
-
-SPREAD = 0.7  # of the complex squared lengths about those at home
 
 
 def _from_generic(at: Parameters, rng: np.random.Generator) -> tuple[Complex, Complex, list[int]]:
@@ -169,9 +170,6 @@ def _from_generic(at: Parameters, rng: np.random.Generator) -> tuple[Complex, Co
     e, t = e[near], t[near]
     kept = distinct(e, t, APART)
     return e[kept], t[kept], [len(generic()[1]), len(half[0]), len(kept)]
-
-
-FAR = 1e6  # normalised distance beyond which an end is at infinity
 
 
 def _first_of_pairs(frames: Frames, e: Complex, t: Complex) -> Array:
