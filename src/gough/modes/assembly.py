@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array, as_batch
 from gough.kinematics import equivalent_struts
 from gough.modes.certificate import certify
-from gough.modes.finish import FAR, REAL, finish_rows
+from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, leaves
 from gough.modes.follow import SHARE, follow
 from gough.modes.frames import Frames
 from gough.modes.result import AssemblyModes, ModesStatus
-from gough.modes.singular import curve_of_poses, merge, poses_near
+from gough.modes.singular import Problem, curve_of_poses, merge, poses_near
 from gough.modes.starts import SEED, Start, second_start, start_of
-from gough.modes.tracker import FINITE
+from gough.modes.study import distinct
+from gough.modes.tracker import FINITE, LOST
 from gough.platform import Platform
 
 CHUNK = 128  # sets of readings per task
@@ -167,25 +168,31 @@ def _record_singular(work: _Work, row: int, outcome: _Outcome, ends, e, t, kind)
     """Regular poses, and those that the paths which came together were heading for."""
     start = work.start
     base, squares = work.normalised(np.array([row]))
-    finite = ends.ends[0] == FINITE
-    far = ~finite & (np.abs(ends.t[0]).max(axis=1) > FAR)
+    how, real = ends.ends[0], kind == REAL
+    pairs = zip(how, ends.t[0], strict=True)
+    far = np.array([bool(leaves(end, place, squares[0])) for end, place in pairs])
+    open_ends = ~far & ((how != FINITE) | (kind == DOUBTFUL))
+    problem = Problem(start.frames.moving, base[0], squares[0], TOLERANCE)
+    lost = int(np.sum(how == LOST))
     found = poses_near(
-        start.frames.moving, base[0], squares[0], (ends.e[0][~far], ends.t[0][~far]), TOLERANCE
+        problem, (e[real], t[real]), (ends.e[0][open_ends], ends.t[0][open_ends])
     )
+    jumped = len(distinct(ends.e[0], ends.t[0], SAME)) < len(how)
     e, t, multiple = found.e, found.t, found.paths
     if start.paired:
-        e, t, multiple = _with_mirrors(start, e, t, multiple)
+        mirrored = start.frames.reflect(e, t)  # a flat pose is its own mirror image
+        both = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
+        e, t, multiple = merge(*both, np.concatenate([multiple, multiple]))
     twice = 2 if start.paired else 1
-    away = int(np.sum(far)) * twice
-    real, bad = int(multiple[multiple == 1].sum()), int(multiple[multiple > 1].sum())
-    bad += found.unresolved * twice
+    away, doubtful = int(np.sum(far)) * twice, found.unresolved + lost + jumped > 0
+    regular, meet = int(np.sum(multiple == 1)), int(multiple[multiple > 1].sum())
     outcome.poses[row], outcome.multiple[row] = (e, t), multiple
-    outcome.paths[row] = real, max(0, start.count - real - bad - away), away, bad
+    outcome.paths[row] = regular, max(0, start.count - regular - meet - away), away, meet
     if found.curve:
         outcome.status[row] = ModesStatus.SELF_MOTION
-    elif found.unresolved:
+    elif doubtful:
         outcome.status[row] = ModesStatus.INCOMPLETE
-    elif np.any(multiple > 1):
+    elif meet:
         outcome.status[row] = ModesStatus.SINGULAR
     else:
         outcome.status[row] = ModesStatus.COMPLETE
@@ -197,16 +204,10 @@ def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _
     home = frames.normal(platform.home)
     for row in rows:
         base, squares = work.normalised(np.array([row]))
-        e, t = curve_of_poses(frames.moving, base[0], squares[0], home, TOLERANCE, SEED)
+        problem = Problem(frames.moving, base[0], squares[0], TOLERANCE)
+        e, t = curve_of_poses(problem, home, SEED)
         outcome.poses[row], outcome.multiple[row] = (e, t), np.zeros(len(e), np.int32)
         outcome.status[row] = ModesStatus.ALWAYS_SINGULAR
-
-
-def _with_mirrors(start: Start, e: Array, t: Array, multiple: NDArray[np.int32]):
-    """Mirror images added; a flat pose is its own, and counts twice."""
-    other = start.frames.reflect(e, t)
-    both = np.concatenate([e, other[0]]), np.concatenate([t, other[1]])
-    return merge(*both, np.concatenate([multiple, multiple]))
 
 
 def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) -> AssemblyModes:

@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from gough.fk.jit import jit
-from gough.modes.tracker import FINITE
+from gough.modes.tracker import FINITE, STUCK
 
 COMPLEX, REAL, DOUBTFUL = 0, 1, 2  # kinds of ends; DOUBTFUL: close to real, Newton undecided
 NEAR_REAL = 1e-3  # imaginary part over size from which an end is complex beyond doubt
 SAME = 1e-6  # difference of complex poses over their size below which they are one
-FAR = 1e3  # normalised distance beyond which a path that does not arrive goes to infinity
+FAR = 10.0  # times the largest distance of a real pose, from which a path has left for infinity
 STEPS = 8  # of Newton at most, with residuals that still fall
 
 
@@ -211,10 +211,14 @@ def finish_rows(p, base, squares, e, t, ends, tolerance, out_e, out_t, kind, cle
             if ends[row, k] == FINITE:
                 clean[row] = clean[row] and kind[row, k] != DOUBTFUL
             else:
-                clean[row] = clean[row] and is_far(t[row, k])
+                clean[row] = clean[row] and leaves(ends[row, k], t[row, k], squares[row])
 
 
 @jit()
-def is_far(t):
-    """Whether a path that did not arrive was going to infinity, and so to no pose."""
-    return max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR
+def leaves(end, t, squares):
+    """Whether a path that did not arrive was going to infinity.
+
+    The position of a real pose is at most a leg's length and the joints' distances from 0.
+    """
+    reach = 2.0 + np.sqrt(np.max(squares))
+    return end == STUCK and max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR * reach

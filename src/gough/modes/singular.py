@@ -43,27 +43,28 @@ class Found:
 
 
 def poses_near(
-    p: Array, base: Array, squares: Array, ends: tuple[Complex, Complex], tolerance: float
+    problem: Problem, regular: tuple[Array, Array], ends: tuple[Complex, Complex]
 ) -> Found:
-    """The real poses that the ends of the paths of one set of readings belong to."""
-    problem = Problem(p, base, squares, tolerance)
-    poses = [
-        pose
-        for e, t in zip(*ends, strict=True)
-        if (pose := problem.near(e, t)) is not None
-    ]
-    e = np.array([pose[0] for pose in poses]).reshape(-1, 4)
-    t = np.array([pose[1] for pose in poses]).reshape(-1, 3)
+    """The real poses of one set of readings, some of whose paths did not arrive.
+
+    Args:
+        regular: (R, 4), (R, 3) real poses at which paths arrived.
+        ends: where the others stopped, close to a solution or to several that meet.
+    """
+    extra = [pose for e, t in zip(*ends, strict=True) if (pose := problem.near(e, t)) is not None]
+    e = np.concatenate([regular[0], np.array([pose[0] for pose in extra]).reshape(-1, 4)])
+    t = np.concatenate([regular[1], np.array([pose[1] for pose in extra]).reshape(-1, 3)])
     e, t, paths = merge(e, t, np.ones(len(e), np.int32))
     on_curve, unresolved = [], 0
     for k in range(len(e)):
         values, null = problem.singular_values(e[k], t[k])
-        regular = values[-1] > SMALL * values[0]
-        if regular and paths[k] > 1:  # a path has jumped to another's pose
-            unresolved += int(paths[k]) - 1
+        if values[-1] > SMALL * values[0]:
+            unresolved += int(paths[k]) - 1  # a path has come to another's pose
             paths[k] = 1
-        if not regular and problem.moves_along(e[k], t[k], null):
+        elif problem.moves_along(e[k], t[k], null):
             on_curve.append(k)
+        else:
+            paths[k] = max(2, paths[k])
     if not on_curve:
         return Found(e, t, paths, unresolved, False)
     k = on_curve[0]
@@ -77,13 +78,12 @@ def poses_near(
 
 
 def curve_of_poses(
-    p: Array, base: Array, squares: Array, home: tuple[Array, Array], tolerance: float, seed: int
+    problem: Problem, home: tuple[Array, Array], seed: int
 ) -> tuple[Array, Array]:
     """Samples of a curve of poses for a machine whose legs are dependent at every pose.
 
     Starts at home, then at random poses; empty if no pose has the legs.
     """
-    problem = Problem(p, base, squares, tolerance)
     rng = np.random.default_rng(seed)
     for attempt in range(50):
         e, t = home[0].copy(), home[1].copy()

@@ -28,7 +28,7 @@ from gough.pose import Pose
 SEED = 5  # of all that is drawn here
 QUIET = 3  # loops that bring nothing new before a machine's list counts as complete
 SPREAD = 0.5  # of complex readings about those at home
-FAR = 1e6  # normalised distance beyond which an end is at infinity
+FAR = 300.0  # normalised distance beyond which a solution counts as being at infinity
 CACHED = 64  # machines kept in memory
 
 

@@ -35,15 +35,16 @@ from gough.modes.series import (
     substitute,
 )
 
-FINITE, STUCK, LOST = 1, 2, 3  # how a path ended; STUCK: step too short; LOST: too many passes
+FINITE, STUCK, LOST = 1, 2, 3  # how a path ended; STUCK: just before the target; LOST: elsewhere
 
 SHARE = 0.45  # of the radius of convergence, per step
 ACCEPT = 0.05  # Newton step over last move, above which the move is taken back
 SETTLE = 0.5  # the same where the last move was itself a Newton step
-TINY = 1e-8  # Newton step over the pose's size that is small beside any move
-DONE = 1e-5  # Newton step over the pose's size at the end of the path, after which the pose is good to its square
+TINY = 1e-8  # Newton step that is small beside any move
+DONE = 1e-5  # Newton step at the end of the path, after which the pose is good to its square
 PASSES = 400
 SHORTEST = 1e-7  # step, in a path of length 1
+LATE = 1e-3  # share of a path that may be left where its end is told from where it is stuck
 
 
 @jit()
@@ -61,22 +62,19 @@ def write(z, slot, w, value):
 
 @jit()
 def _norm2(z, first, w):
-    """Sum of the squared magnitudes of six slots from `first`."""
-    total = 0.0
-    for k in range(first, first + 6):
-        re, im = z[k * SLOT + w], z[k * SLOT + LANES + w]
-        total += re * re + im * im
-    return total
+    """Square of the size of six slots from `first`: |c|^2 over the pose's size, plus |r|^2."""
+    size, shift, turn = 1.0, 0.0, 0.0
+    for k in range(3):
+        size += _square(z, T + k, w)
+        shift += _square(z, first + 2 * k, w)
+        turn += _square(z, first + 2 * k + 1, w)
+    return shift / size + turn
 
 
 @jit()
-def _size2(z, w):
-    """Square of how far lane w is from normal size: rounding grows with it."""
-    total = 1.0
-    for k in range(T, T + 3):
-        value = read(z, k, w)
-        total += value.real * value.real + value.imag * value.imag
-    return total
+def _square(z, slot, w):
+    re, im = z[slot * SLOT + w], z[slot * SLOT + LANES + w]
+    return re * re + im * im
 
 
 @jit()
@@ -116,7 +114,7 @@ def _newton(z, p):
 def _small(z, w, limit):
     """Whether the Newton step is small beside the last move."""
     step = _norm2(z, SER, w)
-    return step <= limit * limit * _norm2(z, X, w) or step <= TINY * TINY * _size2(z, w)
+    return step <= limit * limit * _norm2(z, X, w) or step <= TINY * TINY
 
 
 @jit()
@@ -157,10 +155,10 @@ def _next_step(z, w, s, shrink, spent, share):
     if spent > PASSES:
         return 0.0, LOST
     if s >= 1.0:
-        return 0.0, FINITE if _norm2(z, SER, w) <= DONE * DONE * _size2(z, w) else 0
+        return 0.0, FINITE if _norm2(z, SER, w) <= DONE * DONE else 0
     h = share * shrink * _radius(z, w)
     if not h > SHORTEST:
-        return 0.0, STUCK
+        return 0.0, STUCK if 1.0 - s < LATE else LOST
     return min(h, 1.0 - s), 0
 
 
