@@ -17,13 +17,15 @@ from gough.modes.follow import SHARE, follow
 from gough.modes.frames import Frames
 from gough.modes.result import AssemblyModes, ModesStatus
 from gough.modes.singular import Problem, curve_of_poses, merge, poses_near
-from gough.modes.starts import SEED, Start, second_start, start_of
+from gough.modes.starts import SEED, Start, start_of
 from gough.modes.study import distinct
 from gough.modes.tracker import FINITE, LOST
 from gough.platform import Platform
 
 CHUNK = 128  # sets of readings per task
-CAREFUL_SHARES = (0.2, 0.1)  # of the radius of convergence, for readings that need another try
+# What readings whose paths do not all arrive apart are tried with: the share of the radius of
+# convergence that a step takes, and which of the machine's start systems.
+AGAIN = ((0.2, 0), (0.3, 1), (0.3, 2), (0.1, 3))
 TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the legs
 
 
@@ -49,7 +51,7 @@ def assembly_modes(
     start = start_of(platform)
     base, lengths = equivalent_struts(platform, rows)
     valid = np.all(np.isfinite(rows), axis=1) & np.all(lengths > 0, axis=1)
-    work = _Work(start, base if platform.rotary is not None else base[:1], lengths)
+    work = _Work(platform, start, base if platform.rotary is not None else base[:1], lengths)
     outcome = _Outcome.empty(len(rows))
     outcome.status[~valid] = ModesStatus.INVALID_INPUT
     todo = np.flatnonzero(valid)
@@ -64,6 +66,7 @@ def assembly_modes(
 class _Work:
     """Readings in the platform's units, to be tracked from `start`."""
 
+    platform: Platform
     start: Start
     base: Array  # (N or 1, 6, 3)
     lengths: Array  # (N, 6)
@@ -149,17 +152,16 @@ def _record(
 
 def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
     """Shorter steps, then another start; what is still not clean is singular or at infinity."""
-    starts = [work.start, second_start(work.start)]
     tries = []
-    for share in CAREFUL_SHARES:
-        for start in starts:
-            ends, e, t, kind, clean = _track(work, np.array([row]), start, share)
-            if clean[0]:
-                real = kind[0] == REAL
-                away = int(np.sum(ends.ends != FINITE))
-                _record(start, outcome, row, e[0][real], t[0][real], away)
-                return
-            tries.append((ends, e[0], t[0], kind[0]))
+    for share, number in AGAIN:
+        start = start_of(work.platform, number)
+        ends, e, t, kind, clean = _track(work, np.array([row]), start, share)
+        if clean[0]:
+            real = kind[0] == REAL
+            away = int(np.sum(ends.ends != FINITE))
+            _record(start, outcome, row, e[0][real], t[0][real], away)
+            return
+        tries.append((ends, e[0], t[0], kind[0]))
     ends, e, t, kind = max(tries, key=lambda one: np.sum(one[0].ends == FINITE))
     _record_singular(work, row, outcome, ends, e, t, kind)
 

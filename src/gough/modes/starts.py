@@ -10,7 +10,7 @@ readings moves six squared lengths (rotary legs: the arms' tips too), and no pat
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
@@ -59,36 +59,23 @@ class Start:
     history: tuple[int, ...]
 
 
-_known: OrderedDict[str, Start] = OrderedDict()
+_known: OrderedDict[tuple[str, int], Start] = OrderedDict()
 
 
-def start_of(platform: Platform) -> Start:
-    """The machine's start system, from memory if it was found before."""
-    key = platform.digest
+def start_of(platform: Platform, number: int = 0) -> Start:
+    """The machine's start system, from memory if it was found before.
+
+    Args:
+        number: 0, or 1, 2, ... for others: the same search from other random numbers, whose
+            paths to the same readings are different ones.
+    """
+    key = platform.digest, number
     if key not in _known:
-        _known[key] = find_start(platform)
+        _known[key] = find_start(platform, SEED + number)
         while len(_known) > CACHED:
             _known.popitem(last=False)
     _known.move_to_end(key)
     return _known[key]
-
-
-def second_start(start: Start) -> Start:
-    """The same solutions carried to other complex readings: other paths to the same targets."""
-    key = id(start)
-    if key not in _second or _second[key][0] is not start:
-        rng = np.random.default_rng(SEED + 1)
-        squares = start.at.squares * np.exp(0.5j * rng.normal(size=6))
-        ends = follow((start.e, start.t), start.at, squares[None], share=CAREFUL)
-        e, t = ends.finite()
-        whole = len(e) == len(start.e) == len(distinct(e, t, APART))
-        at = Parameters(start.at.base, start.at.moving, squares)
-        _second.clear()
-        _second[key] = start, replace(start, at=at, e=e, t=t) if whole else start
-    return _second[key][1]
-
-
-_second: dict[int, tuple[Start, Start]] = {}
 
 
 @cache

@@ -153,7 +153,7 @@ def _accept(z, w, pose, s, last_s, shrink, base, l2, base_moves):
 def _next_step(z, w, s, shrink, spent, share):
     """How far lane w goes next, and how its path ends if it does (0: it goes on)."""
     if spent > PASSES:
-        return 0.0, LOST
+        return 0.0, STUCK if 1.0 - s < LATE else LOST
     if s >= 1.0:
         return 0.0, FINITE if _norm2(z, SER, w) <= DONE * DONE else 0
     h = share * shrink * _radius(z, w)
