@@ -3,11 +3,11 @@
     python tools/start_system.py            writes src/gough/modes/start_system.npz
     python tools/start_system.py --check    compares bit for bit with what is stored
 
-Joints and a pose are drawn at random in C; the squared lengths are read off. Solutions are
-carried round triangles of random complex squared lengths and base joints; each comes back as
+Needs python-flint. Joints and a pose are drawn at random in C; the squared lengths are read
+off. Solutions are carried round triangles of random complex squared lengths and base joints; each comes back as
 itself or as another one (monodromy), until no loop finds a new one for ten loops. The set is
 then counted again from another random pose of the same hexapod, and each solution is refined
-with 60 digits and certified in ball arithmetic: 40 disjoint balls, each with one solution.
+with 70 digits and certified in ball arithmetic: 40 disjoint balls, each with one solution.
 That no hexapod has more than 40 isolated solutions is a theorem (Ronga and Vust 1995; Lazard
 1993; Mourrain 1993; Wampler 1996), so the list is complete.
 """
@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gough.modes.balls import prove
 from gough.modes.follow import Parameters, follow
 from gough.modes.monodromy import APART, CAREFUL, fill_up, gaussian
 from gough.modes.study import distances, squared_lengths
@@ -43,8 +44,21 @@ def draw(seed: int):
     return (e, t), at, rng
 
 
-def refine(e, t, at):
-    return e/e[:,:1], t
+def refine(e, t, at: Parameters):
+    """Solutions correct to the last bit, and a proof that each is one and they are different.
+
+    Quaternions are scaled to w = 1, so that the numbers do not depend on how they were found.
+    """
+    proofs = [prove(at.base, at.moving, at.squares, *pose) for pose in zip(e, t, strict=True)]
+    if any(proof is None for proof in proofs):
+        raise SystemExit("a solution cannot be certified")
+    print(f"certified: {len(proofs)}; errors up to {max(p.error for p in proofs):.0e}, "
+          f"radii of uniqueness from {min(p.radius for p in proofs):.0e}")  # fmt: skip
+    e = np.array([[complex(v / p.e[0]) for v in p.e] for p in proofs])
+    t = np.array([[complex(v) for v in p.t] for p in proofs])
+    gaps = distances((e, t), (e, t)) + np.eye(len(e))
+    print(f"smallest distance of two solutions: {gaps.min():.3g}")
+    return e, t
 
 
 def main() -> int:
@@ -69,7 +83,8 @@ def main() -> int:
         print("expected 40")
         return 1
     order = np.lexsort((t[:, 0].imag, t[:, 0].real))
-    out = {"base": at.base, "moving": at.moving, "squares": at.squares, "e": e[order], "t": t[order]}
+    out = {"base": at.base, "moving": at.moving, "squares": at.squares}
+    out |= {"e": e[order], "t": t[order]}
     if check:
         with np.load(STORED) as stored:
             same = all(np.array_equal(stored[k], v) for k, v in out.items())
