@@ -49,8 +49,9 @@ def refine(e, t, at: Parameters):
 
     Quaternions are scaled to w = 1, so that the numbers do not depend on how they were found.
     """
-    proofs = [prove(at.base, at.moving, at.squares, *pose) for pose in zip(e, t, strict=True)]
-    if any(proof is None for proof in proofs):
+    tried = [prove(at.base, at.moving, at.squares, *pose) for pose in zip(e, t, strict=True)]
+    proofs = [proof for proof in tried if proof is not None]
+    if len(proofs) < len(tried):
         raise SystemExit("a solution cannot be certified")
     print(f"certified: {len(proofs)}; errors up to {max(p.error for p in proofs):.0e}, "
           f"radii of uniqueness from {min(p.radius for p in proofs):.0e}")  # fmt: skip
@@ -62,7 +63,7 @@ def refine(e, t, at: Parameters):
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Find, prove and store the 40 generic poses.")
     parser.add_argument("--check", action="store_true", help="compare with the stored file")
     check = parser.parse_args().check
     first, at, rng = draw(SEED)
@@ -82,7 +83,7 @@ def main() -> int:
     if len(e) != 40 or len(carried[0]) != 40 or gaps.max() > APART:
         print("expected 40")
         return 1
-    order = np.lexsort((t[:, 0].imag, t[:, 0].real))
+    order = np.lexsort((np.imag(t[:, 0]), np.real(t[:, 0])))
     out = {"base": at.base, "moving": at.moving, "squares": at.squares}
     out |= {"e": e[order], "t": t[order]}
     if check:
@@ -90,7 +91,7 @@ def main() -> int:
             same = all(np.array_equal(stored[k], v) for k, v in out.items())
         print("same bits as stored" if same else "differs from what is stored")
         return 0 if same else 1
-    np.savez(STORED, **out)
+    np.savez(STORED, allow_pickle=False, **out)
     print(f"written: {STORED.name}")
     return 0
 

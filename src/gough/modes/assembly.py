@@ -100,7 +100,7 @@ def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int |
     """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
     chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
     workers = min(len(chunks), threads or len(os.sched_getaffinity(0)))
-    run = lambda chunk: _solve(work, chunk, outcome)  # noqa: E731
+    run = lambda chunk: _solve(work, chunk, outcome)
     if workers <= 1:
         left = [run(chunk) for chunk in chunks]
     else:
@@ -136,9 +136,7 @@ def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[n
     return rows[~clean]
 
 
-def _record(
-    start: Start, outcome: _Outcome, row: int, e: Array, t: Array, away: int
-) -> None:
+def _record(start: Start, outcome: _Outcome, row: int, e: Array, t: Array, away: int) -> None:
     """All paths of a row arrived apart, or left: its real poses, with their mirror images."""
     if start.paired:
         away *= 2
@@ -176,9 +174,7 @@ def _record_singular(work: _Work, row: int, outcome: _Outcome, ends, e, t, kind)
     open_ends = ~far & ((how != FINITE) | (kind == DOUBTFUL))
     problem = Problem(start.frames.moving, base[0], squares[0], TOLERANCE)
     lost = int(np.sum(how == LOST))
-    found = poses_near(
-        problem, (e[real], t[real]), (ends.e[0][open_ends], ends.t[0][open_ends])
-    )
+    found = poses_near(problem, (e[real], t[real]), (ends.e[0][open_ends], ends.t[0][open_ends]))
     jumped = len(distinct(ends.e[0], ends.t[0], SAME)) < len(how)
     e, t, multiple = found.e, found.t, found.paths
     if start.paired:

@@ -129,9 +129,7 @@ def relative(moving, e, t, f, u) -> tuple[arb, arb]:
     size = size_of(moving)
     centre = [sum(row[k] for row in moving) / 6 for k in range(3)]
     n, k = sum(v * v for v in e), sum(v * v for v in f)
-    shift = [
-        _rotate(f, k, centre)[i] + u[i] - _rotate(e, n, centre)[i] - t[i] for i in range(3)
-    ]
+    shift = [_rotate(f, k, centre)[i] + u[i] - _rotate(e, n, centre)[i] - t[i] for i in range(3)]
     back = [e[0], -e[1], -e[2], -e[3]]
     w = f[0] * back[0] - _dot(f[1:], back[1:])
     cross = _cross(f[1:], back[1:])

@@ -30,10 +30,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array
 from gough.fk.jit import jit
-from gough.kinematics import equivalent_struts, joint_radius
+from gough.kinematics import equivalent_struts
 from gough.modes.lanes import LANES, get_real, larger, put_real, root
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_product, wxyz_to_matrix
+from gough.pose import Pose, wxyz_to_matrix
 
 UNIT = 2.0**-53
 # Bounds on rounding, in UNITs, derived in docs/modes.md with room to spare:
@@ -154,7 +154,7 @@ def _bulk(base, arms, centre, size, lengths, position, wxyz, turn, matrix, radiu
         _radii(z, size)
         for w in range(min(LANES, count - first)):
             good, near = z[OUT * LANES + w], z[(OUT + 1) * LANES + w]
-            if good > near and near >= 0.0:  # false for NaN
+            if good > near >= 0.0:  # false for NaN
                 radius[first + w], error[first + w] = good, near
 
 
@@ -183,7 +183,11 @@ def _equations(z, arms, centre, size, turn, matrix):
     away = root(t0 * t0 + t1 * t1 + t2 * t2) + np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
     for i in range(6):
         p0, p1, p2 = arms[i, 0], arms[i, 1], arms[i, 2]
-        b0, b1, b2 = get_real(z, BASE + 3 * i), get_real(z, BASE + 3 * i + 1), get_real(z, BASE + 3 * i + 2)
+        b0, b1, b2 = (
+            get_real(z, BASE + 3 * i),
+            get_real(z, BASE + 3 * i + 1),
+            get_real(z, BASE + 3 * i + 2),
+        )
         q0 = r00 * p0 + r01 * p1 + r02 * p2
         q1 = r10 * p0 + r11 * p1 + r12 * p2
         q2 = r20 * p0 + r21 * p1 + r22 * p2
@@ -202,7 +206,7 @@ def _equations(z, arms, centre, size, turn, matrix):
         bound = root(dd + mm) * (0.5 / size) + (long + larger(f, f * -1.0)) * (0.125 / size / size)
         put_real(z, BOUND + i, (bound + 0.5) * SLACK)
         row = 6 * i
-        l = 1.0 / size  # noqa: E741
+        l = 1.0 / size
         n0, n1, n2 = (q1 * d2 - q2 * d1) * l, (q2 * d0 - q0 * d2) * l, (q0 * d1 - q1 * d0) * l
         put_real(z, A + row, d0)
         put_real(z, A + row + 1, n0)

@@ -57,8 +57,8 @@ def choose_mode(
     max_turn: float = np.inf,
     up: ArrayLike | None = None,
     orientation: ArrayLike | None = None,
-    hint_error: float | None = None,
-    max_swing: float | None = None,
+    hint_error: float = 0.0,
+    max_swing: float = np.inf,
 ) -> Choice:
     """Filter and rank assembly modes by what a machine can do and what sensors say.
 
@@ -79,8 +79,8 @@ def choose_mode(
         max_swing: [rad]: "swing" passes poses whose struts are turned by at most that from
             their direction at home, at base and at platform joints.
     """
-    if (up is not None or orientation is not None) and hint_error is None:
-        raise GoughError("hint_error: needed with up or orientation; the sensor's error in rad")
+    if (up is not None or orientation is not None) and not hint_error > 0:
+        raise GoughError("hint_error: expected the sensor's error in rad, above 0, beside a hint")
     platform, pose, row = modes.platform, modes.pose, modes.row
     passes = {"side": same_side(platform, pose), "sign": modes.sign > 0}
     if platform.stroke is not None:
@@ -90,7 +90,7 @@ def choose_mode(
         passes["workspace"] = platform.in_workspace(pose)
     if platform.rotary is not None:
         passes["branch"] = _on_branch(platform, pose, modes.readings)
-    if max_swing is not None:
+    if max_swing < np.inf:
         passes["swing"] = swing(platform, pose) <= max_swing
     target = platform.home if near is None else near
     shift, turn = pose.distance(_per_row(target, row))
@@ -99,8 +99,9 @@ def choose_mode(
     if up is not None:
         vertical = as_batch("up", up, (3,))
         vertical = vertical / np.linalg.norm(vertical, axis=-1, keepdims=True)
-        seen = (pose.rotation @ (vertical[row] if vertical.ndim > 1 else vertical)[..., None])[..., 0]
-        passes["up"] = np.arctan2(np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2]) <= hint_error
+        vertical = vertical[row] if vertical.ndim > 1 else vertical
+        x, y, z = (pose.rotation @ vertical[..., None])[..., 0].T
+        passes["up"] = np.arctan2(np.hypot(x, y), z) <= hint_error
     if orientation is not None:
         hint = Pose(np.zeros(3), as_batch("orientation", orientation, (4,)))
         passes["orientation"] = pose.distance(_per_row(hint, row))[1] <= hint_error

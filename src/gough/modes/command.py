@@ -73,7 +73,9 @@ def _readings(legs: tuple[str, ...]) -> Any:
     try:
         numbers = np.array([float(v) for v in legs])
     except ValueError as error:
-        raise InputError(f"LEGS: {error}; expected six numbers or a .csv or .parquet file") from None
+        raise InputError(
+            f"LEGS: {error}; expected six numbers or a .csv or .parquet file"
+        ) from None
     if len(numbers) != 6:
         raise InputError(f"LEGS: expected six readings, found {len(numbers)}")
     return numbers
@@ -82,13 +84,12 @@ def _readings(legs: tuple[str, ...]) -> Any:
 def _read(path: str) -> Any:
     import numpy as np
     import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet
+    from pyarrow import csv, parquet
 
     from gough.errors import InputError
 
     try:
-        reader = pa.csv.read_csv if path.endswith(".csv") else pa.parquet.read_table
+        reader = csv.read_csv if path.endswith(".csv") else parquet.read_table
         table = reader(path)
     except (OSError, pa.ArrowInvalid) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
@@ -157,22 +158,21 @@ def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
     real, other, away, meet = modes.paths.reshape(-1, 4)[k]
     mine = modes.row == k
     status = ModesStatus(int(np.ravel(modes.status)[k]))
-    parts = [
+    counts = (
         f"{mine.sum()} real poses, {int(modes.certified[mine].sum())} certified; of this "
         f"machine's {modes.solutions} complex solutions {real} are real, {other} complex, "
-        f"{away} at infinity, {meet} in multiple ones.",
-        status.text,
-        f"{np.ravel(choice.count)[k]} of them pass every filter ({', '.join(choice.passes)}).",
-    ]
-    return "\n".join(parts)
+        f"{away} at infinity, {meet} in multiple ones."
+    )
+    passed = np.ravel(choice.count)[k]
+    filters = f"{passed} of them pass every filter ({', '.join(choice.passes)})."
+    return f"{counts}\n{status.text}\n{filters}"
 
 
 def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
     """One row for each pose; the file appears whole or not at all."""
     import numpy as np
     import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet
+    from pyarrow import csv, parquet
 
     from gough.errors import GoughError
     from gough.modes.result import ModesStatus
@@ -195,7 +195,7 @@ def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
     target = Path(path)
     temporary = target.with_name(f"{target.name}.{os.getpid()}.partial")
     try:
-        writer = pa.csv.write_csv if path.endswith(".csv") else pa.parquet.write_table
+        writer = csv.write_csv if path.endswith(".csv") else parquet.write_table
         writer(table, str(temporary))
         os.replace(temporary, target)
     except OSError as error:

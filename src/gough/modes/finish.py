@@ -64,7 +64,11 @@ def legs_at(p, base, squares, e, t, a, x):
     rotate(e, p, q)
     worst = 0.0
     for i in range(6):
-        d0, d1, d2 = q[i, 0] + t[0] - base[i, 0], q[i, 1] + t[1] - base[i, 1], q[i, 2] + t[2] - base[i, 2]
+        d0, d1, d2 = (
+            q[i, 0] + t[0] - base[i, 0],
+            q[i, 1] + t[1] - base[i, 1],
+            q[i, 2] + t[2] - base[i, 2],
+        )
         a[i, 0], a[i, 1], a[i, 2] = d0, d1, d2
         a[i, 3] = q[i, 1] * d2 - q[i, 2] * d1
         a[i, 4] = q[i, 2] * d0 - q[i, 0] * d2

@@ -15,9 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.modes.study import Complex, product, rotation
+from gough.modes.study import product
 from gough.platform import Platform
 from gough.pose import Pose, wxyz_to_matrix
 
@@ -86,7 +87,7 @@ class Frames:
         there = pose.position + self.pivot + arm - self.base_centre
         return e, there @ wxyz_to_matrix(_U).T / self.scale
 
-    def reflect(self, e: Complex, t: Complex) -> tuple[Complex, Complex]:
+    def reflect(self, e: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
         """The mirror images of normalised poses of a planar platform."""
         assert self.mirror is not None
         n, m = self.mirror
@@ -99,6 +100,3 @@ def _normal(joints: Array) -> Array | None:
     """Unit normal of the plane that holds all joints (6, 3), or None."""
     _, spread, axes = np.linalg.svd(joints - joints.mean(axis=0))
     return axes[2] if spread[2] <= FLAT * spread[0] else None
-
-
-__all__ = ["FLAT", "Frames", "rotation"]

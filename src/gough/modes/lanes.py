@@ -12,6 +12,8 @@ LLVM splits the vectors of eight into what the processor has (AVX-512, AVX2, NEO
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable
+from typing import Any, cast
 
 from llvmlite import ir
 from numba.core import cgutils, types
@@ -22,6 +24,11 @@ LANES = 8
 SLOT = 2 * LANES  # doubles per slot
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _FLAGS = ("contract", "nsz")
+
+
+def _builtin(function: Callable) -> Callable[..., Any]:
+    """A function of compiled code; its first parameter and its types are Numba's affair."""
+    return intrinsic(function)
 
 
 class LanesType(types.Type):
@@ -73,17 +80,17 @@ def _splat(builder, scalar):
 
 class _Arithmetic(AbstractTemplate):
     def generic(self, args, kws):
-        if len(args) == 2 and lanes in args:
-            if all(a in (lanes, types.float64, types.complex128) for a in args):
-                return signature(lanes, *args)
-        elif len(args) == 2 and _vector in args:
-            if all(a in (_vector, types.float64) for a in args):
-                return signature(_vector, *args)
+        for kind, scalars in (
+            (lanes, (types.float64, types.complex128)),
+            (_vector, (types.float64,)),
+        ):
+            if len(args) == 2 and kind in args and all(a == kind or a in scalars for a in args):
+                return signature(kind, *args)
         return None
 
 
 for _op in (operator.add, operator.sub, operator.mul, operator.truediv):
-    infer_global(_op)(type(f"_{_op.__name__}", (_Arithmetic,), {}))
+    cast(Any, infer_global)(_op)(type(f"_{_op.__name__}", (_Arithmetic,), {}))
 
 
 def _real(instruction: str):
@@ -114,7 +121,7 @@ def _sub(context, builder, sig, args):
 
 def _mul(context, builder, sig, args):
     (ar, ai), (br, bi) = (_parts(context, builder, v) for v in args)
-    mul = lambda a, b: builder.fmul(a, b, _FLAGS)  # noqa: E731
+    mul = lambda a, b: builder.fmul(a, b, _FLAGS)
     re = builder.fsub(mul(ar, br), mul(ai, bi), _FLAGS)
     im = builder.fadd(mul(ar, bi), mul(ai, br), _FLAGS)
     return _make(context, builder, re, im)
@@ -149,15 +156,13 @@ def _pointers(context, builder, array_type, array, slot):
     data = context.make_array(array_type)(context, builder, array).data
     out = []
     for part in range(2):
-        first = builder.add(
-            builder.mul(slot, slot.type(SLOT)), slot.type(part * LANES)
-        )
+        first = builder.add(builder.mul(slot, slot.type(SLOT)), slot.type(part * LANES))
         address = builder.gep(data, [first])
         out.append(builder.bitcast(address, _VECTOR.as_pointer()))
     return out
 
 
-@intrinsic
+@_builtin
 def get(typingctx, z, slot):
     """The eight complex numbers in a slot of the flat float64 array z."""
 
@@ -169,7 +174,7 @@ def get(typingctx, z, slot):
     return lanes(z, types.int64), codegen
 
 
-@intrinsic
+@_builtin
 def put(typingctx, z, slot, value):
     """Write eight complex numbers to a slot of the flat float64 array z."""
 
@@ -182,15 +187,13 @@ def put(typingctx, z, slot, value):
     return types.void(z, types.int64, lanes), codegen
 
 
-@intrinsic
+@_builtin
 def reciprocal(typingctx, value):
     """1 / value in every lane."""
 
     def codegen(context, builder, sig, args):
         re, im = _parts(context, builder, args[0])
-        square = builder.fadd(
-            builder.fmul(re, re, _FLAGS), builder.fmul(im, im, _FLAGS), _FLAGS
-        )
+        square = builder.fadd(builder.fmul(re, re, _FLAGS), builder.fmul(im, im, _FLAGS), _FLAGS)
         over = builder.fdiv(_splat(builder, ir.Constant(ir.DoubleType(), 1.0)), square)
         minus = builder.fneg(over)
         return _make(context, builder, builder.fmul(re, over), builder.fmul(im, minus))
@@ -198,7 +201,7 @@ def reciprocal(typingctx, value):
     return lanes(lanes), codegen
 
 
-@intrinsic
+@_builtin
 def zero(typingctx):
     """Eight zeros."""
 
@@ -209,7 +212,7 @@ def zero(typingctx):
     return lanes(), codegen
 
 
-@intrinsic
+@_builtin
 def ones(typingctx):
     """Eight ones."""
 
@@ -220,7 +223,7 @@ def ones(typingctx):
     return lanes(), codegen
 
 
-@intrinsic
+@_builtin
 def get_real(typingctx, z, slot):
     """Eight real numbers: entries 8 slot to 8 slot + 7 of the flat float64 array z."""
 
@@ -230,7 +233,7 @@ def get_real(typingctx, z, slot):
     return _vector(z, types.int64), codegen
 
 
-@intrinsic
+@_builtin
 def put_real(typingctx, z, slot, value):
     """Write eight real numbers to entries 8 slot to 8 slot + 7 of the flat float64 array z."""
 
@@ -248,7 +251,7 @@ def _real_pointer(context, builder, array_type, array, slot):
     return builder.bitcast(builder.gep(data, [first]), _VECTOR.as_pointer())
 
 
-@intrinsic
+@_builtin
 def root(typingctx, value):
     """Square roots of eight reals."""
 
@@ -261,7 +264,7 @@ def root(typingctx, value):
     return _vector(_vector), codegen
 
 
-@intrinsic
+@_builtin
 def larger(typingctx, a, b):
     """The larger of each two of eight reals; b where they do not compare."""
 

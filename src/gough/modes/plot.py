@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -29,7 +30,8 @@ def draw(modes: AssemblyModes, path: str | Path) -> None:
     columns = max(1, math.ceil(math.sqrt(1.6 * count)))
     rows = max(1, math.ceil(count / columns))
     figure = Figure(figsize=(5 + 1.3 * columns, max(5.2, 1.5 * rows + 0.9)), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=[5, 1.3 * columns])
+    parts: Any = figure.subfigures(1, 2, width_ratios=[5, 1.3 * columns])
+    left, right = parts
     base, _ = equivalent_struts(modes.platform, modes.legs)
     joints = joint_positions(modes.platform, modes.pose)
     unit = modes.platform.unit or "unit"
@@ -49,7 +51,7 @@ def draw(modes: AssemblyModes, path: str | Path) -> None:
         axes.set_aspect("equal")
         if k < count:
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-            _single(axes, views[0], views[1][order[k]], modes.sign[order[k]])
+            _single(axes, views[0], views[1][order[k]], float(modes.sign[order[k]]))
             axes.set_title(f"{k + 1}", fontsize=8, pad=1)
     right.suptitle("each pose by itself, all to one scale", fontsize=10)
     certified = int(modes.certified.sum())

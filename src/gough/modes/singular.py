@@ -77,9 +77,7 @@ def poses_near(
     )  # fmt: skip
 
 
-def curve_of_poses(
-    problem: Problem, home: tuple[Array, Array], seed: int
-) -> tuple[Array, Array]:
+def curve_of_poses(problem: Problem, home: tuple[Array, Array], seed: int) -> tuple[Array, Array]:
     """Samples of a curve of poses for a machine whose legs are dependent at every pose.
 
     Starts at home, then at random poses; empty if no pose has the legs.
@@ -95,9 +93,7 @@ def curve_of_poses(
     return np.zeros((0, 4)), np.zeros((0, 3))
 
 
-def merge(
-    e: Array, t: Array, paths: NDArray[np.int32]
-) -> tuple[Array, Array, NDArray[np.int32]]:
+def merge(e: Array, t: Array, paths: NDArray[np.int32]) -> tuple[Array, Array, NDArray[np.int32]]:
     """Poses that are the same become one, their paths added."""
     kept: list[int] = []
     counts: list[int] = []

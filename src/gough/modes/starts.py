@@ -15,8 +15,8 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gough.checks import Array
 from gough.kinematics import normalised_jacobian
 from gough.modes.follow import Parameters, follow
 from gough.modes.frames import Frames
@@ -81,10 +81,10 @@ def start_of(platform: Platform, number: int = 0) -> Start:
 @cache
 def generic() -> tuple[Parameters, Complex, Complex]:
     """The stored hexapod with 40 solutions; made by tools/start_system.py."""
-    with resources.files("gough.modes").joinpath("start_system.npz").open("rb") as file:
-        with np.load(file) as stored:
-            at = Parameters(stored["base"], stored["moving"], stored["squares"])
-            return at, stored["e"], stored["t"]
+    path = resources.files("gough.modes").joinpath("start_system.npz")
+    with path.open("rb") as file, np.load(file) as stored:
+        at = Parameters(stored["base"], stored["moving"], stored["squares"])
+        return at, stored["e"], stored["t"]
 
 
 def find_start(platform: Platform, seed: int = SEED) -> Start:
@@ -159,7 +159,7 @@ def _from_generic(at: Parameters, rng: np.random.Generator) -> tuple[Complex, Co
     return e[kept], t[kept], [len(generic()[1]), len(half[0]), len(kept)]
 
 
-def _first_of_pairs(frames: Frames, e: Complex, t: Complex) -> Array:
+def _first_of_pairs(frames: Frames, e: Complex, t: Complex) -> NDArray[np.int64]:
     """Indices of one pose of each pair of mirror images."""
     gaps = distances((e, t), frames.reflect(e, t))
     first: list[int] = []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 
 
-def product(a: Complex, b: Complex) -> Complex:
+def product(a: NDArray, b: NDArray) -> NDArray:
     """Hamilton product of quaternions (..., 4)."""
     aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)

@@ -10,8 +10,6 @@ the last move sends the lane back to try a shorter one. Lanes that end take the 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from gough.fk.jit import jit
@@ -19,13 +17,13 @@ from gough.modes.lanes import LANES, SLOT
 from gough.modes.series import (
     BASE,
     BASE_RATE,
-    E,
     L2,
     L2_RATE,
     ORDER,
     SER,
     SIZE,
     STEP,
+    E,
     T,
     X,
     advance,
