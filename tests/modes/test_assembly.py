@@ -9,8 +9,10 @@ import pytest
 from machines import ALL, TELESCOPIC, found, poses_of, random_platform
 
 import gough
+from gough.modes.follow import follow
 from gough.modes.result import ModesStatus
 from gough.modes.starts import find_start
+from gough.modes.study import distances
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +115,27 @@ def test_stored_start_system_is_reproduced_and_proven(capsys, monkeypatch):
     said = capsys.readouterr().out
     assert "certified: 40" in said
     assert "same bits as stored" in said
+
+
+def test_all_complex_ends_are_proven_in_ball_arithmetic():
+    """Forty solutions of three platforms, real and complex, each proven, none twice."""
+    balls = pytest.importorskip("gough.modes.balls")
+    for seed in range(3):
+        platform = random_platform(seed)
+        start = find_start(platform)
+        base, squares = (
+            start.frames.base(platform.base),
+            start.frames.squares(platform.home_lengths),
+        )
+        ends = follow((start.e, start.t), start.at, squares[None].astype(complex))
+        e, t = ends.finite()
+        assert len(e) == 40
+        for k in range(40):
+            proof = balls.prove(base, start.frames.moving, squares, e[k], t[k], steps=2)
+            assert proof is not None
+            assert proof.error < 1e-12 * proof.radius
+        gaps = distances((e, t), (e, t)) + np.eye(40)
+        assert gaps.min() > 1e-4
 
 
 def test_length_changes_and_pivot():

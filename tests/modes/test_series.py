@@ -67,7 +67,7 @@ def test_taylor_series_follows_the_path_to_its_order(base_moves):
     squares = squared_lengths(e, t, base, p)
     rate, speed = gaussian(rng, 6), gaussian(rng, 6, 3) * base_moves
     errors = []
-    for h in (0.02, 0.01):
+    for h in (0.05, 0.025):
         z = np.zeros(SIZE)
         for slot, value in ((E, e), (T, t), (BASE, base), (BASE_RATE, speed), (L2, squares),
                             (L2_RATE, rate), (STEP, np.array([h]))):  # fmt: skip
@@ -76,7 +76,7 @@ def test_taylor_series_follows_the_path_to_its_order(base_moves):
         there = squared_lengths(values(z, E, 4), values(z, T, 3), base + h * speed, p)
         errors.append(np.abs(there - squares - h * rate).max())
     order = np.log2(errors[0] / errors[1])
-    assert errors[0] < 1e-4
+    assert errors[0] < 1e-2
     assert ORDER + 0.5 < order < ORDER + 1.6
 
 
@@ -99,7 +99,12 @@ def test_newton_step_is_quadratic():
 def test_there_and_back_again():
     """A path, and the same path backwards, return every solution to itself."""
     rng = np.random.default_rng(5)
-    p, base, e, t = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 1, 4), gaussian(rng, 1, 3)
+    p, base, e, t = (
+        gaussian(rng, 6, 3),
+        gaussian(rng, 6, 3),
+        gaussian(rng, 1, 4),
+        gaussian(rng, 1, 3),
+    )
     here = Parameters(base, p, squared_lengths(e, t, base, p)[0])
     squares, joints = gaussian(rng, 6) * 3, gaussian(rng, 6, 3)
     away = follow((e, t), here, squares[None], joints[None])
@@ -118,6 +123,4 @@ def test_complex_rotations_preserve_dots():
 def test_inverse_exchanges_base_and_platform():
     rng = np.random.default_rng(8)
     p, base, e, t = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 4), gaussian(rng, 3)
-    assert np.allclose(
-        squared_lengths(e, t, base, p), squared_lengths(*inverse(e, t), p, base)
-    )
+    assert np.allclose(squared_lengths(e, t, base, p), squared_lengths(*inverse(e, t), p, base))

@@ -16,7 +16,7 @@ from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, leaves
 from gough.modes.follow import SHARE, follow
 from gough.modes.frames import Frames
 from gough.modes.result import AssemblyModes, ModesStatus
-from gough.modes.singular import Problem, curve_of_poses, merge, poses_near
+from gough.modes.singular import Problem, classify, curve_of_poses, gather, merge
 from gough.modes.starts import SEED, Start, start_of
 from gough.modes.study import distinct
 from gough.modes.tracker import FINITE, LOST
@@ -99,7 +99,7 @@ class _Outcome:
 def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int | None) -> None:
     """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
     chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
-    workers = min(len(chunks), threads or len(os.sched_getaffinity(0)))
+    workers = min(len(chunks), threads or usable_cores())
     run = lambda chunk: _solve(work, chunk, outcome)
     if workers <= 1:
         left = [run(chunk) for chunk in chunks]
@@ -108,6 +108,13 @@ def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int |
             left = list(pool.map(run, chunks))
     for row in np.concatenate([*left, np.zeros(0, np.int64)]).astype(int):
         _solve_again(work, row, outcome)
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float):
@@ -119,7 +126,8 @@ def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float):
     e, t = np.zeros((*shape, 4)), np.zeros((*shape, 3))
     kind, clean = np.zeros(shape, np.uint8), np.zeros(len(rows), np.bool_)
     finish_rows(
-        start.frames.moving, np.ascontiguousarray(base), np.ascontiguousarray(squares),
+        start.frames.moving, np.ascontiguousarray(base), start.base_moves,
+        np.ascontiguousarray(squares),
         ends.e, ends.t, ends.ends, TOLERANCE, e, t, kind, clean,
     )  # fmt: skip
     return ends, e, t, kind, clean
@@ -170,19 +178,21 @@ def _record_singular(work: _Work, row: int, outcome: _Outcome, ends, e, t, kind)
     base, squares = work.normalised(np.array([row]))
     how, real = ends.ends[0], kind == REAL
     pairs = zip(how, ends.t[0], strict=True)
-    far = np.array([bool(leaves(end, place, squares[0])) for end, place in pairs])
+    far = np.array([bool(leaves(end, place, squares[0], start.base_moves)) for end, place in pairs])
     open_ends = ~far & ((how != FINITE) | (kind == DOUBTFUL))
     problem = Problem(start.frames.moving, base[0], squares[0], TOLERANCE)
     lost = int(np.sum(how == LOST))
-    found = poses_near(problem, (e[real], t[real]), (ends.e[0][open_ends], ends.t[0][open_ends]))
-    jumped = len(distinct(ends.e[0], ends.t[0], SAME)) < len(how)
-    e, t, multiple = found.e, found.t, found.paths
+    stopped = ends.e[0][open_ends], ends.t[0][open_ends]
+    e, t, paths = gather(problem, (e[real], t[real]), stopped)
     if start.paired:
         mirrored = start.frames.reflect(e, t)  # a flat pose is its own mirror image
         both = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
-        e, t, multiple = merge(*both, np.concatenate([multiple, multiple]))
-    twice = 2 if start.paired else 1
-    away, doubtful = int(np.sum(far)) * twice, found.unresolved + lost + jumped > 0
+        e, t, paths = merge(*both, np.concatenate([paths, paths]))
+    found = classify(problem, e, t, paths)
+    e, t, multiple = found.e, found.t, found.paths
+    jumped = len(distinct(ends.e[0], ends.t[0], SAME)) < len(how)
+    away = int(np.sum(far)) * (2 if start.paired else 1)
+    doubtful = found.unresolved + lost + jumped > 0
     regular, meet = int(np.sum(multiple == 1)), int(multiple[multiple > 1].sum())
     outcome.poses[row], outcome.multiple[row] = (e, t), multiple
     outcome.paths[row] = regular, max(0, start.count - regular - meet - away), away, meet

@@ -61,7 +61,8 @@ def size_of(moving) -> arb:
     total = arb(0)
     for row in moving:
         for k in range(3):
-            total += abs(row[k] - centre[k]) ** 2
+            part = row[k] - centre[k]
+            total += part.real * part.real + part.imag * part.imag
     return (total / 6).sqrt()
 
 
@@ -103,10 +104,10 @@ def _radii(base, moving, squares, e, t) -> Proof | None:
 
 def _curvature(d: Vector, m: Vector, f: acb, size: arb) -> arb:
     """b_i. For complex r, (r x m).(r x m) and (r x d).(r x d) need not have one sign."""
-    dd, mm = _norm(d) ** 2, _norm(m) ** 2
+    dd, mm = _norm(d) * _norm(d), _norm(m) * _norm(m)
     real = all(v.imag == 0 for v in [*d, *m])
     long = dd.max(mm) if real else dd + mm
-    return arb(0.5) + (dd + mm).sqrt() / (2 * size) + (long + abs(2 * f)) / (8 * size**2)
+    return arb(0.5) + (dd + mm).sqrt() / (2 * size) + (long + 2 * _norm([f])) / (8 * size**2)
 
 
 def _moved(moving, e, t, x):
@@ -157,7 +158,8 @@ def _cross(a, b) -> Vector:
 
 def _norm(v: Vector) -> arb:
     """The norm; an upper bound where it may be 0."""
-    square = sum((abs(x) ** 2 for x in v), arb(0))
+    parts = [part for x in v for part in (acb(x).real, acb(x).imag)]
+    square = sum((part * part for part in parts), arb(0))
     return square.sqrt() if square > 0 else arb(square.upper()).sqrt()
 
 

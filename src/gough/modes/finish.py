@@ -200,10 +200,10 @@ def _same(e, t, f, u):
 
 
 @jit()
-def finish_rows(p, base, squares, e, t, ends, tolerance, out_e, out_t, kind, clean):
+def finish_rows(p, base, moves, squares, e, t, ends, tolerance, out_e, out_t, kind, clean):
     """`real_ends` for N sets of readings.
 
-    clean (N,): all paths arrived, apart, without doubt, or are on their way to infinity.
+    moves: whether paths moved the base joints. clean (N,): all paths arrived, apart, without doubt, or are on their way to infinity.
     """
     for row in range(squares.shape[0]):
         real_ends(
@@ -215,14 +215,17 @@ def finish_rows(p, base, squares, e, t, ends, tolerance, out_e, out_t, kind, cle
             if ends[row, k] == FINITE:
                 clean[row] = clean[row] and kind[row, k] != DOUBTFUL
             else:
-                clean[row] = clean[row] and leaves(ends[row, k], t[row, k], squares[row])
+                clean[row] = clean[row] and leaves(ends[row, k], t[row, k], squares[row], moves)
 
 
 @jit()
-def leaves(end, t, squares):
+def leaves(end, t, squares, base_moves):
     """Whether a path that did not arrive was going to infinity.
 
     The position of a real pose is at most a leg's length and the joints' distances from 0.
+    Where only squared lengths move, solutions come from infinity and go there at no other
+    place than the target, so one that is lost far away stays far away.
     """
     reach = 2.0 + np.sqrt(np.max(squares))
-    return end == STUCK and max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR * reach
+    far = max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR * reach
+    return far and (end == STUCK or not base_moves)

@@ -42,20 +42,27 @@ class Found:
     curve: bool
 
 
-def poses_near(
+def gather(
     problem: Problem, regular: tuple[Array, Array], ends: tuple[Complex, Complex]
-) -> Found:
+) -> tuple[Array, Array, NDArray[np.int32]]:
     """The real poses of one set of readings, some of whose paths did not arrive.
 
     Args:
         regular: (R, 4), (R, 3) real poses at which paths arrived.
         ends: where the others stopped, close to a solution or to several that meet.
+
+    Returns:
+        (M, 4), (M, 3), and how many paths belong to each, (M,).
     """
     extra = [pose for e, t in zip(*ends, strict=True) if (pose := problem.near(e, t)) is not None]
     e = np.concatenate([regular[0], np.array([pose[0] for pose in extra]).reshape(-1, 4)])
     t = np.concatenate([regular[1], np.array([pose[1] for pose in extra]).reshape(-1, 3)])
-    e, t, paths = merge(e, t, np.ones(len(e), np.int32))
-    on_curve, unresolved = [], 0
+    return merge(e, t, np.ones(len(e), np.int32))
+
+
+def classify(problem: Problem, e: Array, t: Array, paths: NDArray[np.int32]) -> Found:
+    """Tell regular poses from multiple ones and from points of a curve of poses."""
+    paths, on_curve, unresolved = paths.copy(), [], 0
     for k in range(len(e)):
         values, null = problem.singular_values(e[k], t[k])
         if values[-1] > SMALL * values[0]:

@@ -20,15 +20,18 @@ from numpy.typing import NDArray
 from gough.kinematics import normalised_jacobian
 from gough.modes.follow import Parameters, follow
 from gough.modes.frames import Frames
-from gough.modes.monodromy import APART, CAREFUL, fill_up, gaussian
+from gough.modes.monodromy import APART, CAREFUL, Corner, fill_up, gaussian
 from gough.modes.study import Complex, distances, distinct, inverse
+from gough.modes.tracker import LOST
 from gough.platform import Platform
 from gough.pose import Pose
 
 SEED = 5  # of all that is drawn here
 QUIET = 3  # loops that bring nothing new before a machine's list counts as complete
-SPREAD = 0.5  # of complex readings about those at home
-FAR = 300.0  # normalised distance beyond which a solution counts as being at infinity
+SPREAD = 0.5  # of the start's complex readings about those at home
+WIDE = 3.0  # the same of the corners of loops, which must go round the branch points
+ROUTES = 4  # from the generic hexapod at most
+FAR = 1e5  # normalised distance beyond which a solution counts as being at infinity
 CACHED = 64  # machines kept in memory
 
 
@@ -91,13 +94,13 @@ def find_start(platform: Platform, seed: int = SEED) -> Start:
     """Track the 40 generic solutions to the machine; see the module's text."""
     frames = Frames.of(platform)
     rng = np.random.default_rng(seed)
-    corner = _family(platform, frames)
-    squares, base = corner(rng)
+    squares, base = _family(platform, frames, SPREAD)(rng)
     at = Parameters(base, frames.moving.astype(complex), squares)
     if architecturally_singular(platform):
         none = np.zeros((0, 4), complex), np.zeros((0, 3), complex)
         return Start(frames, at, *none, False, 0, False, True, (40, 0))
     e, t, history = _from_generic(at, rng)
+    corner = _family(platform, frames, WIDE)
     (e, t), loops = fill_up((e, t), at, corner, rng, QUIET)
     count = len(e)
     paired = frames.mirror is not None
@@ -123,12 +126,12 @@ def architecturally_singular(platform: Platform) -> bool:
     return bool(np.all(values[:, -1] < 1e-9 * values[:, 0]))
 
 
-def _family(platform: Platform, frames: Frames):
-    """A function that draws complex readings of this machine: squares (6,), base (6, 3)."""
+def _family(platform: Platform, frames: Frames, spread: float) -> Corner:
+    """A function that draws complex readings of this machine, `spread` times their size apart."""
     if platform.rotary is None:
         typical = float(np.mean(frames.squares(platform.home_lengths)))
         fixed = frames.base(platform.base).astype(complex)
-        return lambda rng: (typical * (1 + SPREAD * gaussian(rng, 6)), fixed)
+        return lambda rng: (typical * (1 + spread * gaussian(rng, 6)), fixed)
     arms = platform.rotary
     typical = (arms.rod_length / frames.scale) ** 2
     centre = frames.base(platform.base)
@@ -138,25 +141,51 @@ def _family(platform: Platform, frames: Frames):
 
     def draw(rng: np.random.Generator) -> tuple[Complex, Complex]:
         # arms of complex direction and length: a linear family that holds all readings
-        x, y = cos + SPREAD * gaussian(rng, 6, 1), sin + SPREAD * gaussian(rng, 6, 1)
+        x, y = cos + spread * gaussian(rng, 6, 1), sin + spread * gaussian(rng, 6, 1)
         base = centre + x * (tips[0] - centre) + y * (tips[1] - centre)
-        return typical * (1 + SPREAD * gaussian(rng, 6)), base
+        return typical * (1 + spread * gaussian(rng, 6)), base
 
     return draw
 
 
 def _from_generic(at: Parameters, rng: np.random.Generator) -> tuple[Complex, Complex, list[int]]:
-    """Finite poses at `at`: base joints first, then platform joints, from the stored 40."""
-    origin, e, t = generic()
-    squares = gaussian(rng, 6) * np.mean(np.abs(at.squares))
-    half = follow((e, t), origin, squares[None], at.base[None], share=CAREFUL).finite()
-    here = Parameters(origin.moving, at.base, squares)  # roles exchanged
-    ends = follow(inverse(*half), here, at.squares[None], at.moving[None], share=CAREFUL)
-    e, t = inverse(*ends.finite())
+    """Finite poses at `at`, and how many were known after each route.
+
+    A path that passes infinity at a short distance is lost on the way; then all paths take
+    another route too, and the lists are put together.
+    """
+    e, t, history = np.zeros((0, 4), complex), np.zeros((0, 3), complex), [len(generic()[1])]
+    for _ in range(ROUTES):
+        more_e, more_t, lost = _one_route(at, rng)
+        e, t = np.concatenate([e, more_e]), np.concatenate([t, more_t])
+        kept = distinct(e, t, APART)
+        e, t = e[kept], t[kept]
+        history.append(len(e))
+        if not lost:
+            break
+    return e, t, history
+
+
+def _one_route(at: Parameters, rng: np.random.Generator) -> tuple[Complex, Complex, bool]:
+    """Base joints to the machine's, then platform joints, each over a random point.
+
+    Returns:
+        Finite poses at `at`, and whether a path was lost on the way or met another.
+    """
+    here, e, t = generic()
+    size = np.mean(np.abs(at.squares))
+    lost = False
+    for joints in (at.base, at.moving):
+        detour = gaussian(rng, 6) * size, gaussian(rng, 6, 3)
+        last = at.squares if joints is at.moving else gaussian(rng, 6) * size
+        for squares, base in (detour, (last, joints)):
+            ends = follow((e, t), here, squares[None], base[None], share=CAREFUL)
+            e, t = ends.finite()
+            lost = lost or bool(np.any(ends.ends == LOST)) or len(distinct(e, t, APART)) < len(e)
+            here = Parameters(base, here.moving, squares)
+        (e, t), here = inverse(e, t), Parameters(here.moving, here.base, here.squares)
     near = np.abs(t).max(axis=1, initial=0.0) < FAR
-    e, t = e[near], t[near]
-    kept = distinct(e, t, APART)
-    return e[kept], t[kept], [len(generic()[1]), len(half[0]), len(kept)]
+    return e[near], t[near], lost
 
 
 def _first_of_pairs(frames: Frames, e: Complex, t: Complex) -> NDArray[np.int64]:
