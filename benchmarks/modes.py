@@ -58,7 +58,8 @@ def general(count: int) -> None:
     solutions, seconds = [], []
     for seed in range(count):
         rng = np.random.default_rng(seed)
-        platform = gough.Platform(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)), home=(0, 0, 2))
+        joints = rng.normal(size=(2, 6, 3))
+        platform = gough.Platform(*joints, gough.Pose([0, 0, 2]))
         began = time.perf_counter()
         solutions.append(find_start(platform).count)
         seconds.append(time.perf_counter() - began)
@@ -78,7 +79,8 @@ def special() -> None:
         ("3-3, an octahedron", [0, 0, 1, 1, 2, 2], [0, 1, 1, 2, 2, 0]),
         ("three legs meet, two meet", range(6), [0, 0, 0, 1, 1, 2]),
     ):
-        platform = gough.Platform(joints[0][list(base)], joints[1][list(moving)], home=(0, 0, 2))
+        home = gough.Pose([0, 0, 2])
+        platform = gough.Platform(joints[0][list(base)], joints[1][list(moving)], home)
         print(f"{name:28} {find_start(platform).count}")
     for name in MACHINES:
         start = start_of(gough.Platform.load(name))
@@ -90,18 +92,21 @@ def times(count: int) -> None:
     heading(f"time per set of readings, {count} sets from the workspace")
     print(f"{'machine':16} solutions  one call  in a batch  {cores} threads   real poses")
     for name in MACHINES:
-        platform = gough.Platform.load(name)
-        legs = gough.leg_lengths(platform, some_poses(platform, count))
-        alone = [clock(lambda row=row: gough.assembly_modes(platform, row)) for row in legs[:200]]
-        one = clock(lambda: gough.assembly_modes(platform, legs, threads=1)) / len(legs)
-        many = clock(lambda: gough.assembly_modes(platform, legs)) / len(legs)
-        modes = gough.assembly_modes(platform, legs)
-        counts, times_seen = np.unique(modes.counts, return_counts=True)
-        seen = ", ".join(f"{n}: {k}" for n, k in zip(counts, times_seen, strict=True))
-        print(
-            f"{name:16} {modes.solutions:9}  {1e3 * np.median(alone):5.2f} ms  "
-            f"{1e3 * one:7.3f} ms  {1e3 * many:6.3f} ms   {seen}"
-        )
+        print(machine_times(gough.Platform.load(name), count))
+
+
+def machine_times(platform: gough.Platform, count: int) -> str:
+    legs = gough.leg_lengths(platform, some_poses(platform, count))
+    modes = gough.assembly_modes(platform, legs)
+    alone = [clock(lambda row=row: gough.assembly_modes(platform, row)) for row in legs[:200]]
+    one = clock(lambda: gough.assembly_modes(platform, legs, threads=1)) / len(legs)
+    many = clock(lambda: gough.assembly_modes(platform, legs)) / len(legs)
+    numbers, how_often = np.unique(modes.counts, return_counts=True)
+    seen = ", ".join(f"{n}: {k}" for n, k in zip(numbers, how_often, strict=True))
+    return (
+        f"{platform.name:16} {modes.solutions:9}  {1e3 * np.median(alone):5.2f} ms  "
+        f"{1e3 * one:7.3f} ms  {1e3 * many:6.3f} ms   {seen}"
+    )
 
 
 def trajectory(count: int) -> None:
@@ -128,15 +133,19 @@ def certificates(count: int) -> None:
     pose = platform.sample_poses(count, 3)
     legs = gough.leg_lengths(platform, pose)
     parts = np.ascontiguousarray(pose.position), np.ascontiguousarray(pose.wxyz)
-    call = lambda: certify_batch(platform.base[None], platform.moving, legs, *parts)  # noqa: E731
+
+    def call():
+        return certify_batch(platform.base[None], platform.moving, legs, *parts)
+
     call()
     seconds = min(clock(call) for _ in range(5))
     certified, radius = call()
     print(f"{1e9 * seconds / count:.0f} ns per pose, certified {certified.mean():.5%}")
     low, median = np.percentile(radius, [0, 50])
     print(f"radius of uniqueness [mm]: smallest {low:.2f}, median {median:.2f}")
-    if hasattr(gough, "solve"):
-        seconds = min(clock(lambda: gough.solve(platform, legs)) for _ in range(3))
+    solve = getattr(gough, "solve", None)
+    if callable(solve):
+        seconds = min(clock(lambda: solve(platform, legs)) for _ in range(3))
         print(f"gough.solve: {1e9 * seconds / count:.0f} ns per pose, all threads")
 
 

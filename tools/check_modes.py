@@ -64,6 +64,7 @@ def search(p, base, squares, e, t, known_e, known_t, hit):
 
 
 def main() -> None:
+    """Parse the options and print a line for each machine."""
     parser = argparse.ArgumentParser(description="Look for missing assembly modes.")
     parser.add_argument("--poses", type=int, default=1000)
     parser.add_argument("--starts", type=int, default=6000)

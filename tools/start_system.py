@@ -4,11 +4,11 @@
     python tools/start_system.py --check    compares bit for bit with what is stored
 
 Needs python-flint. Joints and a pose are drawn at random in C; the squared lengths are read
-off. Solutions are carried round triangles of random complex squared lengths and base joints; each comes back as
-itself or as another one (monodromy), until no loop finds a new one for ten loops. The set is
-then counted again from another random pose of the same hexapod, and each solution is refined
-with 70 digits and certified in ball arithmetic: 40 disjoint balls, each with one solution.
-That no hexapod has more than 40 isolated solutions is a theorem (Ronga and Vust 1995; Lazard
+off. Solutions are carried round triangles of random complex squared lengths and base joints;
+each comes back as itself or as another one (monodromy), until no loop finds a new one for ten
+loops. The set is then counted again from another random pose of the same hexapod, and each
+solution is refined with 70 digits and certified in ball arithmetic: 40 balls, each with one
+solution, far apart. That no hexapod has more than 40 isolated solutions is a theorem (Ronga and Vust 1995; Lazard
 1993; Mourrain 1993; Wampler 1996), so the list is complete.
 """
 
@@ -63,6 +63,7 @@ def refine(e, t, at: Parameters):
 
 
 def main() -> int:
+    """Find the solutions, prove them, write or compare them."""
     parser = argparse.ArgumentParser(description="Find, prove and store the 40 generic poses.")
     parser.add_argument("--check", action="store_true", help="compare with the stored file")
     check = parser.parse_args().check

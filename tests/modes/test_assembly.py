@@ -86,7 +86,7 @@ def test_random_platforms_have_forty_solutions():
 
 
 @pytest.mark.parametrize(
-    "base, moving, planar, count",
+    ("base", "moving", "planar", "count"),
     [
         (range(6), range(6), True, 40),
         (range(6), [0, 0, 1, 1, 2, 2], False, 16),

@@ -65,7 +65,7 @@ def contracts(balls, platform, legs, pose, edge) -> bool:
     base = [[balls.acb(v) for v in row] for row in platform.base]
     e, t = ([balls.acb(v) for v in part] for part in (pose.wxyz, pose.position))
     squares = [balls.acb(v) ** 2 for v in legs]
-    f, a, d, m, size = balls.equations(base, moving, squares, e, t)
+    _, a, d, m, size = balls.equations(base, moving, squares, e, t)
     box = [arb(0, edge) for _ in range(7)]  # 2 g0, 2 c, 2 L r
     g0, c, r = box[0] / 2, [v / 2 for v in box[1:4]], [v / (2 * size) for v in box[4:]]
     rows = [[0.0] * 7 for _ in range(7)]

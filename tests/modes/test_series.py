@@ -10,8 +10,21 @@ from gough.modes.follow import Parameters, follow
 from gough.modes.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
 from gough.modes.monodromy import gaussian
 from gough.modes.series import (
-    BASE, BASE_RATE, L2, L2_RATE, ORDER, SER, SIZE, STEP, E, T,
-    advance, evaluate, expand, factorise, substitute,
+    BASE,
+    BASE_RATE,
+    L2,
+    L2_RATE,
+    ORDER,
+    SER,
+    SIZE,
+    STEP,
+    E,
+    T,
+    advance,
+    evaluate,
+    expand,
+    factorise,
+    substitute,
 )  # fmt: skip
 from gough.modes.study import distances, inverse, product, rotation, squared_lengths
 

@@ -100,7 +100,10 @@ def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int |
     """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
     chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
     workers = min(len(chunks), threads or usable_cores())
-    run = lambda chunk: _solve(work, chunk, outcome)
+
+    def run(chunk: NDArray[np.int64]) -> NDArray[np.int64]:
+        return _solve(work, chunk, outcome)
+
     if workers <= 1:
         left = [run(chunk) for chunk in chunks]
     else:

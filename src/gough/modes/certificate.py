@@ -8,7 +8,8 @@ equation of leg i is
 
     F_i(x) = f_i / 2 + A_i x + B_i(x, x),       A_i = (d_i, q_i x d_i / L),
 
-    |B_i(x, x)| <= b_i |x|^2,   b_i = 1/2 + sqrt(d^2 + m^2) / (2 L) + (max(d^2, m^2) + |f|) / (8 L^2)
+    |B_i(x, x)| <= b_i |x|^2,
+    b_i = 1/2 + sqrt(d^2 + m^2) / (2 L) + (max(d^2, m^2) + |f|) / (8 L^2)
 
 in the norm |x| = max(|2 g|, |2 L r|). For any matrix Y close to A's inverse, with
 
@@ -206,8 +207,8 @@ def _equations(z, arms, centre, size, turn, matrix):
         bound = root(dd + mm) * (0.5 / size) + (long + larger(f, f * -1.0)) * (0.125 / size / size)
         put_real(z, BOUND + i, (bound + 0.5) * SLACK)
         row = 6 * i
-        l = 1.0 / size
-        n0, n1, n2 = (q1 * d2 - q2 * d1) * l, (q2 * d0 - q0 * d2) * l, (q0 * d1 - q1 * d0) * l
+        n0, n1, n2 = q1 * d2 - q2 * d1, q2 * d0 - q0 * d2, q0 * d1 - q1 * d0
+        n0, n1, n2 = n0 * (1.0 / size), n1 * (1.0 / size), n2 * (1.0 / size)
         put_real(z, A + row, d0)
         put_real(z, A + row + 1, n0)
         put_real(z, A + row + 2, d1)

@@ -104,7 +104,7 @@ def refine(p, base, squares, e, t):
     a, x = np.empty((6, 6)), np.empty(6)
     best_e, best_t = e.copy(), t.copy()
     best, moved = np.inf, 0.0
-    for step in range(STEPS):
+    for _ in range(STEPS):
         left = legs_at(p, base, squares, e, t, a, x)
         if not left < best:
             break
@@ -203,7 +203,10 @@ def _same(e, t, f, u):
 def finish_rows(p, base, moves, squares, e, t, ends, tolerance, out_e, out_t, kind, clean):
     """`real_ends` for N sets of readings.
 
-    moves: whether paths moved the base joints. clean (N,): all paths arrived, apart, without doubt, or are on their way to infinity.
+    Args:
+        moves: whether paths moved the base joints.
+        clean: (N,) all paths arrived, apart and without doubt, or went to infinity; the other
+            arguments are those of `real_ends` with an axis for the sets before.
     """
     for row in range(squares.shape[0]):
         real_ends(

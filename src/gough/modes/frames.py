@@ -40,7 +40,7 @@ class Frames:
         pivot: (3,) the platform's pivot [platform unit].
         moving: (6, 3) normalised platform joints.
         mirror: two unit quaternions (n, m) if base and platform joints are planar: (t, e) and
-            its mirror image (-n t n, n e m), n t n meaning the quaternion product, have the same legs.
+            its mirror image (t - 2 (n.t) n, n e m), a quaternion product, have the same legs.
     """
 
     scale: float

@@ -121,7 +121,10 @@ def _sub(context, builder, sig, args):
 
 def _mul(context, builder, sig, args):
     (ar, ai), (br, bi) = (_parts(context, builder, v) for v in args)
-    mul = lambda a, b: builder.fmul(a, b, _FLAGS)
+
+    def mul(a, b):
+        return builder.fmul(a, b, _FLAGS)
+
     re = builder.fsub(mul(ar, br), mul(ai, bi), _FLAGS)
     im = builder.fadd(mul(ar, bi), mul(ai, br), _FLAGS)
     return _make(context, builder, re, im)
