@@ -8,8 +8,8 @@ off. Solutions are carried round triangles of random complex squared lengths and
 each comes back as itself or as another one (monodromy), until no loop finds a new one for ten
 loops. The set is then counted again from another random pose of the same hexapod, and each
 solution is refined with 70 digits and certified in ball arithmetic: 40 balls, each with one
-solution, far apart. That no hexapod has more than 40 isolated solutions is a theorem (Ronga and Vust 1995; Lazard
-1993; Mourrain 1993; Wampler 1996), so the list is complete.
+solution, far apart. That no hexapod has more than 40 isolated solutions is a theorem (Ronga and
+Vust 1995; Lazard 1993; Mourrain 1993; Wampler 1996), so the list is complete.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ def draw(seed: int):
     rng = np.random.default_rng(seed)
     base, moving = gaussian(rng, 6, 3), gaussian(rng, 6, 3)
     e, t = gaussian(rng, 1, 4), gaussian(rng, 1, 3)
-    at = Parameters(base, moving, squared_lengths(e, t, base, moving)[0])
+    # rounded, so that no processor's way of adding shows in what is stored
+    at = Parameters(base, moving, np.round(squared_lengths(e, t, base, moving)[0], 9))
     return (e, t), at, rng
 
 
@@ -55,7 +56,7 @@ def refine(e, t, at: Parameters):
         raise SystemExit("a solution cannot be certified")
     print(f"certified: {len(proofs)}; errors up to {max(p.error for p in proofs):.0e}, "
           f"radii of uniqueness from {min(p.radius for p in proofs):.0e}")  # fmt: skip
-    e = np.array([[complex(v / p.e[0]) for v in p.e] for p in proofs])
+    e = np.array([[1.0, *(complex(v / p.e[0]) for v in p.e[1:])] for p in proofs])
     t = np.array([[complex(v) for v in p.t] for p in proofs])
     gaps = distances((e, t), (e, t)) + np.eye(len(e))
     print(f"smallest distance of two solutions: {gaps.min():.3g}")
