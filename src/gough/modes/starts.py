@@ -31,7 +31,7 @@ QUIET = 3  # loops that bring nothing new before a machine's list counts as comp
 SPREAD = 0.5  # of the start's complex readings about those at home
 WIDE = 3.0  # the same of the corners of loops, which must go round the branch points
 ROUTES = 4  # from the generic hexapod at most
-FAR = 1e5  # normalised distance beyond which a solution counts as being at infinity
+FAR = 2e4  # normalised distance beyond which a solution counts as being at infinity
 CACHED = 64  # machines kept in memory
 
 
