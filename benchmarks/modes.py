@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def general(count: int) -> None:
     for seed in range(count):
         rng = np.random.default_rng(seed)
         joints = rng.normal(size=(2, 6, 3))
-        platform = gough.Platform(*joints, gough.Pose([0, 0, 2]))
+        platform = gough.Platform(joints[0], joints[1], gough.Pose([0, 0, 2]))
         began = time.perf_counter()
         solutions.append(find_start(platform).count)
         seconds.append(time.perf_counter() - began)
@@ -143,8 +144,8 @@ def certificates(count: int) -> None:
     print(f"{1e9 * seconds / count:.0f} ns per pose, certified {certified.mean():.5%}")
     low, median = np.percentile(radius, [0, 50])
     print(f"radius of uniqueness [mm]: smallest {low:.2f}, median {median:.2f}")
-    solve = getattr(gough, "solve", None)
-    if callable(solve):
+    if hasattr(gough, "solve"):
+        solve: Any = getattr(gough, "solve")  # noqa: B009
         seconds = min(clock(lambda: solve(platform, legs)) for _ in range(3))
         print(f"gough.solve: {1e9 * seconds / count:.0f} ns per pose, all threads")
 

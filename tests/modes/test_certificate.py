@@ -8,7 +8,8 @@ from machines import ALL, poses_of
 
 import gough
 from gough.kinematics import equivalent_struts, joint_radius
-from gough.modes.certificate import certify_batch
+from gough.modes.certificate import TURNS, _bulk_with, certify_batch
+from gough.pose import wxyz_to_matrix
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -95,6 +96,30 @@ def contracts(balls, platform, legs, pose, edge) -> bool:
         entries = (abs(product[i, j] - (1 if i == j else 0)).upper() for j in range(7))
         worst = max(worst, sum(float(v) for v in entries))
     return worst < 1
+
+
+def test_small_pivots_are_noticed():
+    """Where the inverse fails for want of pivoting, nothing false is claimed."""
+    balls = pytest.importorskip("gough.modes.balls")
+    platform = gough.Platform.load("reference")
+    pose = platform.sample_poses(60, 8)
+    axis = wxyz_to_matrix(TURNS[0])[0]  # the first pivot is the first strut's part along it
+    strut = gough.joint_positions(platform, pose)[:, 0] - platform.base[0]
+    along = strut @ axis * (1 - np.logspace(-16, -1, 60))
+    pose = gough.Pose(pose.position - along[:, None] * axis, pose.wxyz)
+    legs = gough.leg_lengths(platform, pose)
+    alone = _bulk_with(
+        TURNS[0], platform.base[None], platform.moving, legs, pose.position, pose.wxyz
+    )
+    proof = gough.certify(platform, legs, pose)
+    assert np.sum(alone[0] == 0) > np.sum(~proof.certified)
+    for k in range(60):
+        best = balls.prove(platform.base, platform.moving, legs[k] ** 2, pose.wxyz[k],
+                           pose.position[k], steps=0)  # fmt: skip
+        limit = 0.0 if best is None else best.radius
+        assert alone[0][k] <= limit
+        assert proof.radius[k] <= limit
+        assert proof.certified[k] == (best is not None)
 
 
 def test_modes_lie_outside_each_others_radius():

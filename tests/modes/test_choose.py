@@ -7,6 +7,7 @@ import pytest
 from machines import poses_of
 
 import gough
+from gough.modes.choose import ambiguous
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +66,8 @@ def test_ambiguity_is_reported():
     modes = gough.assembly_modes(platform, platform.home_legs)
     choice = gough.choose_mode(modes)
     assert choice.ambiguous
+    assert ambiguous(platform, platform.home_legs)
+    assert not ambiguous(known, known.home_legs)
     assert choice.count == np.sum(choice.passed)
     limited = gough.choose_mode(modes, max_swing=np.radians(20))
     assert not limited.ambiguous

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array
 from gough.fk.jit import jit
 from gough.kinematics import equivalent_struts
-from gough.modes.lanes import LANES, get_real, larger, put_real, root
+from gough.modes.lanes import LANES, get_real, larger, magnitude, put_real, root
 from gough.platform import Platform
 from gough.pose import Pose, wxyz_to_matrix
 
@@ -42,9 +42,10 @@ STRUT = 96.0  # error of a computed strut over the sum of the lengths it is made
 SQUARE = 8.0  # further error of d.d - l^2 over d.d + l^2
 SLACK = 1.0 + 1e-9  # for the arithmetic of the bounds themselves
 
-# A rotation in no special position, so that inversion needs no pivots at symmetric poses.
-_TURN = np.array([0.52, 0.37, -0.61, 0.47]) / np.linalg.norm([0.52, 0.37, -0.61, 0.47])
-_TURN_MATRIX = wxyz_to_matrix(_TURN)
+# Rotations of the base frame in no special position, so that inversion needs no pivots at
+# symmetric poses. Rows that fail with one, perhaps by a small pivot, are tried with the other.
+TURNS = np.array([[0.52, 0.37, -0.61, 0.47], [0.29, -0.73, 0.44, 0.43]])
+TURNS /= np.linalg.norm(TURNS, axis=1, keepdims=True)
 
 # Slots of eight reals
 E, T, BASE, LENGTH, A, Y, F, BOUND = 0, 4, 7, 25, 31, 67, 103, 109
@@ -108,18 +109,38 @@ def certify_batch(
     return _certify(base, moving, lengths, position, wxyz)[:2]
 
 
-def _certify(base, moving, lengths, position, wxyz):
+def _certify(
+    base: Array, moving: Array, lengths: Array, position: Array, wxyz: Array
+) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Whether certified, radii and errors, each (N,)."""
     count = len(lengths)
     radius, error = np.zeros(count), np.full(count, np.inf)
-    arms = moving - moving.mean(axis=0)
-    size = float(np.sqrt(np.mean(np.sum(arms**2, axis=1))))
-    centre = moving.mean(axis=0)
-    turned = np.ascontiguousarray(base @ _TURN_MATRIX.T)
-    _bulk(
-        turned, arms, centre, size, np.ascontiguousarray(lengths), np.ascontiguousarray(position),
-        np.ascontiguousarray(wxyz), _TURN, _TURN_MATRIX, radius, error,
-    )  # fmt: skip
+    todo: slice | NDArray[np.int64] = slice(None)
+    for turn in TURNS:
+        rows = base if len(base) == 1 else base[todo]
+        found = _bulk_with(turn, rows, moving, lengths[todo], position[todo], wxyz[todo])
+        radius[todo], error[todo] = found
+        todo = np.flatnonzero(radius == 0)
+        if not len(todo):
+            break
     return radius > 0, radius, error
+
+
+def _bulk_with(
+    turn: Array, base: Array, moving: Array, lengths: Array, position: Array, wxyz: Array
+) -> tuple[Array, Array]:
+    """Radii and errors (n,), with the base frame turned by a quaternion."""
+    count = len(lengths)
+    radius, error = np.zeros(count), np.full(count, np.inf)
+    centre = moving.mean(axis=0)
+    arms = moving - centre
+    size = float(np.sqrt(np.mean(np.sum(arms**2, axis=1))))
+    matrix = wxyz_to_matrix(turn)
+    _bulk(
+        np.ascontiguousarray(base @ matrix.T), arms, centre, size, np.ascontiguousarray(lengths),
+        np.ascontiguousarray(position), np.ascontiguousarray(wxyz), turn, matrix, radius, error,
+    )  # fmt: skip
+    return radius, error
 
 
 @jit()
@@ -181,7 +202,8 @@ def _equations(z, arms, centre, size, turn, matrix):
     o0 = o0 + r00 * c0 + r01 * c1 + r02 * c2
     o1 = o1 + r10 * c0 + r11 * c1 + r12 * c2
     o2 = o2 + r20 * c0 + r21 * c1 + r22 * c2
-    away = root(t0 * t0 + t1 * t1 + t2 * t2) + np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
+    # sums of magnitudes bound norms, for rounding, without square roots
+    away = magnitude(t0) + magnitude(t1) + magnitude(t2) + (abs(c0) + abs(c1) + abs(c2))
     for i in range(6):
         p0, p1, p2 = arms[i, 0], arms[i, 1], arms[i, 2]
         b0, b1, b2 = (
@@ -198,13 +220,14 @@ def _equations(z, arms, centre, size, turn, matrix):
         dd, mm, square = d0 * d0 + d1 * d1 + d2 * d2, m0 * m0 + m1 * m1 + m2 * m2, length * length
         f = dd - square
         put_real(z, F + i, f * 0.5)
-        arm = np.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-        whole = root(b0 * b0 + b1 * b1 + b2 * b2) + away + arm
+        arm = abs(p0) + abs(p1) + abs(p2)
+        whole = magnitude(b0) + magnitude(b1) + magnitude(b2) + away + arm
+        reach = magnitude(d0) + magnitude(d1) + magnitude(d2)
         strut = whole * (STRUT * UNIT)
-        put_real(z, ROUND_F + i, strut * (root(dd) + strut) + (dd + square) * (SQUARE * UNIT))
-        put_real(z, ROUND_A + i, strut * (root(dd) + strut + (arm + size)) * (1.0 / size))
+        put_real(z, ROUND_F + i, strut * (reach + strut) + (dd + square) * (SQUARE * UNIT))
+        put_real(z, ROUND_A + i, strut * (reach + strut + (arm + size)) * (1.0 / size))
         long = larger(dd, mm)
-        bound = root(dd + mm) * (0.5 / size) + (long + larger(f, f * -1.0)) * (0.125 / size / size)
+        bound = root(dd + mm) * (0.5 / size) + (long + magnitude(f)) * (0.125 / size / size)
         put_real(z, BOUND + i, (bound + 0.5) * SLACK)
         row = 6 * i
         n0, n1, n2 = q1 * d2 - q2 * d1, q2 * d0 - q0 * d2, q0 * d1 - q1 * d0

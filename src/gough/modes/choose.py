@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.kinematics import joint_positions, leg_lengths
+from gough.modes.assembly import assembly_modes
 from gough.modes.result import AssemblyModes
 from gough.platform import Platform
 from gough.pose import Pose, wxyz_to_matrix
@@ -106,6 +108,16 @@ def choose_mode(
         hint = Pose(np.zeros(3), as_batch("orientation", orientation, (4,)))
         passes["orientation"] = pose.distance(_per_row(hint, row))[1] <= hint_error
     return _ranked(modes, passes, shift / platform.size + turn)
+
+
+def ambiguous(platform: Platform, legs: ArrayLike, **filters: Any) -> NDArray[np.bool_]:
+    """Whether more than one pose with these readings passes every filter of `choose_mode`.
+
+    Args:
+        legs: (6,) or (N, 6).
+        filters: as for `choose_mode`.
+    """
+    return choose_mode(assembly_modes(platform, legs), **filters).ambiguous
 
 
 def same_side(platform: Platform, pose: Pose) -> NDArray[np.bool_]:

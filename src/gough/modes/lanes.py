@@ -257,14 +257,25 @@ def _real_pointer(context, builder, array_type, array, slot):
 @_builtin
 def root(typingctx, value):
     """Square roots of eight reals."""
+    return _vector(_vector), _llvm("sqrt")
+
+
+@_builtin
+def magnitude(typingctx, value):
+    """Absolute values of eight reals."""
+    return _vector(_vector), _llvm("fabs")
+
+
+def _llvm(name: str):
+    """Code that calls one of LLVM's functions of eight reals."""
 
     def codegen(context, builder, sig, args):
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
-        name = f"llvm.sqrt.v{LANES}f64"
-        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        full = f"llvm.{name}.v{LANES}f64"
+        function = cgutils.get_or_insert_function(builder.module, kind, full)
         return builder.call(function, args)
 
-    return _vector(_vector), codegen
+    return codegen
 
 
 @_builtin
