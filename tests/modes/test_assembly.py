@@ -9,6 +9,7 @@ import pytest
 from machines import ALL, TELESCOPIC, found, poses_of, random_platform
 
 import gough
+from gough.modes import assembly
 from gough.modes.follow import follow
 from gough.modes.result import ModesStatus
 from gough.modes.starts import find_start
@@ -100,6 +101,15 @@ def test_special_platforms_have_fewer_solutions(base, moving, planar, count):
     assert find_start(random_platform(4, base, moving, planar)).count == count
 
 
+@pytest.mark.parametrize(
+    ("name", "count"), [("reference", 28), ("nasa_msfc", 28), ("linuxcnc_genhex", 16)]
+)
+def test_planar_machines_track_one_of_each_pair(name, count):
+    start = find_start(gough.Platform.load(name))
+    assert start.paired
+    assert (start.count, len(start.e)) == (count, count // 2)
+
+
 def test_another_seed_finds_the_same_count():
     for name in ALL:
         platform = gough.Platform.load(name)
@@ -136,6 +146,24 @@ def test_all_complex_ends_are_proven_in_ball_arithmetic():
             assert proof.error < 1e-12 * proof.radius
         gaps = distances((e, t), (e, t)) + np.eye(40)
         assert gaps.min() > 1e-4
+
+
+@pytest.mark.parametrize("name", ["dietmaier", "matlab_stewart", "reachy_mini"])
+def test_readings_that_fail_at_first_are_done_again(name, monkeypatch):
+    """With steps of twenty radii many paths are lost; the answer must be the same."""
+    platform = gough.Platform.load(name)
+    legs = gough.leg_lengths(platform, poses_of(platform, 30))
+    usual = gough.assembly_modes(platform, legs)
+    again, redone = assembly._solve_again, []
+    monkeypatch.setattr(assembly, "SHARE", 20.0)
+    monkeypatch.setattr(
+        assembly, "_solve_again", lambda *args: (redone.append(args[1]), again(*args))
+    )
+    hasty = gough.assembly_modes(platform, legs)
+    assert redone
+    assert np.array_equal(hasty.row, usual.row)
+    assert np.array_equal(hasty.status, usual.status)
+    assert np.abs(hasty.pose.position - usual.pose.position).max() < 1e-8 * platform.size
 
 
 def test_length_changes_and_pivot():

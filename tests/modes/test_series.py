@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from machines import poses_of
 
+import gough
 from gough.fk.jit import jit
+from gough.modes.finish import repeated
 from gough.modes.follow import Parameters, follow
 from gough.modes.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
 from gough.modes.monodromy import gaussian
@@ -26,7 +29,9 @@ from gough.modes.series import (
     factorise,
     substitute,
 )  # fmt: skip
-from gough.modes.study import distances, inverse, product, rotation, squared_lengths
+from gough.modes.starts import start_of
+from gough.modes.study import distances, distinct, inverse, product, rotation, squared_lengths
+from gough.modes.tracker import FINITE, STUCK
 
 
 @jit(cache=False)
@@ -137,3 +142,27 @@ def test_inverse_exchanges_base_and_platform():
     rng = np.random.default_rng(8)
     p, base, e, t = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 4), gaussian(rng, 3)
     assert np.allclose(squared_lengths(e, t, base, p), squared_lengths(*inverse(e, t), p, base))
+
+
+def test_steps_far_too_long_are_taken_back():
+    """Even at 1.5 radii of convergence a step, paths arrive, and none jumps to another's end."""
+    platform = gough.Platform.load("dietmaier")
+    start = start_of(platform)
+    legs = gough.leg_lengths(platform, poses_of(platform, 60))
+    squares = start.frames.squares(legs).astype(complex)
+    ends = follow((start.e, start.t), start.at, squares, share=1.5)
+    assert np.mean(ends.ends == FINITE) > 0.99
+    for k in range(60):
+        e, t = ends.finite(k)
+        assert len(distinct(e, t, 1e-6)) == len(e)
+
+
+def test_shared_ends_are_seen():
+    rng = np.random.default_rng(9)
+    e, t = gaussian(rng, 5, 4), gaussian(rng, 5, 3)
+    arrived = np.full(5, FINITE, np.uint8)
+    assert not repeated(e, t, arrived)
+    e[3], t[3] = e[1] * (0.3 - 2.0j), t[1] + 1e-9  # a quaternion's factor does not matter
+    assert repeated(e, t, arrived)
+    arrived[3] = STUCK
+    assert not repeated(e, t, arrived)

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array, as_batch
 from gough.kinematics import equivalent_struts
 from gough.modes.certificate import certify
-from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, leaves
-from gough.modes.follow import SHARE, follow
+from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows
+from gough.modes.follow import SHARE, Ends, follow
 from gough.modes.frames import Frames
 from gough.modes.result import AssemblyModes, ModesStatus
 from gough.modes.singular import Problem, classify, curve_of_poses, gather, merge
@@ -26,6 +26,7 @@ CHUNK = 128  # sets of readings per task
 # What readings whose paths do not all arrive apart are tried with: the share of the radius of
 # convergence that a step takes, and which of the machine's start systems.
 AGAIN = ((0.2, 0), (0.3, 1), (0.3, 2), (0.1, 3))
+DISTANT = 1e3  # normalised: starts beyond belong to no pose, where the base joints are fixed
 TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the legs
 
 
@@ -120,71 +121,79 @@ def usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float):
+def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float) -> _Tracked:
     """Paths from `start` to some rows, and their real ends."""
     base, squares = work.normalised(rows)
-    moves = base.astype(complex) if len(work.base) > 1 or work.start.base_moves else None
+    moves = base.astype(complex) if start.base_moves else None
     ends = follow((start.e, start.t), start.at, squares.astype(complex), moves, share=share)
     shape = ends.ends.shape
-    e, t = np.zeros((*shape, 4)), np.zeros((*shape, 3))
-    kind, clean = np.zeros(shape, np.uint8), np.zeros(len(rows), np.bool_)
+    e, t, kind = np.zeros((*shape, 4)), np.zeros((*shape, 3)), np.zeros(shape, np.uint8)
+    away, clean = np.zeros(shape, np.bool_), np.zeros(len(rows), np.bool_)
+    distant = np.abs(start.t).max(axis=1, initial=0.0) > DISTANT
     finish_rows(
-        start.frames.moving, np.ascontiguousarray(base), start.base_moves,
-        np.ascontiguousarray(squares),
-        ends.e, ends.t, ends.ends, TOLERANCE, e, t, kind, clean,
+        start.frames.moving, np.ascontiguousarray(base), np.ascontiguousarray(squares), ends.e,
+        ends.t, ends.ends, distant & (not start.base_moves), share < SHARE, TOLERANCE,
+        e, t, kind, away, clean,
     )  # fmt: skip
-    return ends, e, t, kind, clean
+    return _Tracked(start, ends, e, t, kind, away, clean)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tracked:
+    """Ends of the P paths of n rows, and what `finish_rows` makes of them."""
+
+    start: Start
+    ends: Ends
+    e: Array  # (n, P, 4) the real poses
+    t: Array
+    kind: NDArray[np.uint8]  # (n, P)
+    away: NDArray[np.bool_]
+    clean: NDArray[np.bool_]  # (n,)
+
+    def record(self, k: int, outcome: _Outcome, row: int) -> None:
+        """Poses of the clean row k, whose place among all is `row`, with mirror images."""
+        start, real, away = self.start, self.kind[k] == REAL, int(self.away[k].sum())
+        e, t = self.e[k][real], self.t[k][real]
+        if start.paired:
+            away *= 2
+            mirrored = start.frames.reflect(e, t)
+            e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
+        outcome.poses[row] = e, t
+        outcome.multiple[row] = np.ones(len(e), np.int32)
+        outcome.paths[row] = len(e), start.count - len(e) - away, away, 0
+        outcome.status[row] = ModesStatus.COMPLETE
 
 
 def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
     """Track a chunk; returns the rows that were not clean."""
-    start = work.start
-    ends, e, t, kind, clean = _track(work, rows, start, SHARE)
-    away = np.sum(ends.ends != FINITE, axis=1)
-    for k in np.flatnonzero(clean):
-        real = kind[k] == REAL
-        _record(start, outcome, rows[k], e[k][real], t[k][real], int(away[k]))
-    return rows[~clean]
-
-
-def _record(start: Start, outcome: _Outcome, row: int, e: Array, t: Array, away: int) -> None:
-    """All paths of a row arrived apart, or left: its real poses, with their mirror images."""
-    if start.paired:
-        away *= 2
-        mirrored = start.frames.reflect(e, t)
-        e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
-    outcome.poses[row] = e, t
-    outcome.multiple[row] = np.ones(len(e), np.int32)
-    outcome.paths[row] = len(e), start.count - len(e) - away, away, 0
-    outcome.status[row] = ModesStatus.COMPLETE
+    tracked = _track(work, rows, work.start, SHARE)
+    for k in np.flatnonzero(tracked.clean):
+        tracked.record(int(k), outcome, int(rows[k]))
+    return rows[~tracked.clean]
 
 
 def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
-    """Shorter steps, then another start; what is still not clean is singular or at infinity."""
+    """Shorter steps, then another start; what is still not clean is singular."""
     tries = []
     for share, number in AGAIN:
-        start = start_of(work.platform, number)
-        ends, e, t, kind, clean = _track(work, np.array([row]), start, share)
-        if clean[0]:
-            real = kind[0] == REAL
-            away = int(np.sum(ends.ends != FINITE))
-            _record(start, outcome, row, e[0][real], t[0][real], away)
+        tracked = _track(work, np.array([row]), start_of(work.platform, number), share)
+        if tracked.clean[0]:
+            tracked.record(0, outcome, row)
             return
-        tries.append((ends, e[0], t[0], kind[0]))
-    ends, e, t, kind = max(tries, key=lambda one: np.sum(one[0].ends == FINITE))
-    _record_singular(work, row, outcome, ends, e, t, kind)
+        tries.append(tracked)
+    best = max(tries, key=lambda one: np.sum(one.ends.ends == FINITE))
+    _record_singular(work, row, outcome, best)
 
 
-def _record_singular(work: _Work, row: int, outcome: _Outcome, ends, e, t, kind) -> None:
+def _record_singular(work: _Work, row: int, outcome: _Outcome, tracked: _Tracked) -> None:
     """Regular poses, and those that the paths which came together were heading for."""
-    start = work.start
+    start, ends = tracked.start, tracked.ends
+    e, t, kind, far = tracked.e[0], tracked.t[0], tracked.kind[0], tracked.away[0]
     base, squares = work.normalised(np.array([row]))
     how, real = ends.ends[0], kind == REAL
-    pairs = zip(how, ends.t[0], strict=True)
-    far = np.array([bool(leaves(end, place, squares[0], start.base_moves)) for end, place in pairs])
     open_ends = ~far & ((how != FINITE) | (kind == DOUBTFUL))
     problem = Problem(start.frames.moving, base[0], squares[0], TOLERANCE)
-    lost = int(np.sum(how == LOST))
+    lost = int(np.sum((how == LOST) & ~far))
     stopped = ends.e[0][open_ends], ends.t[0][open_ends]
     e, t, paths = gather(problem, (e[real], t[real]), stopped)
     if start.paired:

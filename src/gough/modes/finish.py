@@ -200,13 +200,16 @@ def _same(e, t, f, u):
 
 
 @jit()
-def finish_rows(p, base, moves, squares, e, t, ends, tolerance, out_e, out_t, kind, clean):
-    """`real_ends` for N sets of readings.
+def finish_rows(
+    p, base, squares, e, t, ends, distant, careful, tolerance, out_e, out_t, kind, away, clean
+):
+    """`real_ends` for N sets of readings; arguments as there, with an axis for the sets.
 
     Args:
-        moves: whether paths moved the base joints.
-        clean: (N,) all paths arrived, apart and without doubt, or went to infinity; the other
-            arguments are those of `real_ends` with an axis for the sets before.
+        distant: (P,) starts so far away that their paths lead to no pose: they may be lost.
+        careful: steps were short, so that a path that ends far away was meant to.
+        away: (N, P) to be filled: paths that went to infinity.
+        clean: (N,) to be filled: the other paths arrived, apart and without doubt.
     """
     for row in range(squares.shape[0]):
         real_ends(
@@ -218,17 +221,13 @@ def finish_rows(p, base, moves, squares, e, t, ends, tolerance, out_e, out_t, ki
             if ends[row, k] == FINITE:
                 clean[row] = clean[row] and kind[row, k] != DOUBTFUL
             else:
-                clean[row] = clean[row] and leaves(ends[row, k], t[row, k], squares[row], moves)
+                gone = careful and ends[row, k] == STUCK and is_far(t[row, k], squares[row])
+                away[row, k] = distant[k] or gone
+                clean[row] = clean[row] and away[row, k]
 
 
 @jit()
-def leaves(end, t, squares, base_moves):
-    """Whether a path that did not arrive was going to infinity.
-
-    The position of a real pose is at most a leg's length and the joints' distances from 0.
-    Where only squared lengths move, solutions come from infinity and go there at no other
-    place than the target, so one that is lost far away stays far away.
-    """
+def is_far(t, squares):
+    """Whether a position is far beyond any real pose's: a leg and the joints' distances from 0."""
     reach = 2.0 + np.sqrt(np.max(squares))
-    far = max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR * reach
-    return far and (end == STUCK or not base_moves)
+    return max(abs(t[0]), abs(t[1]), abs(t[2])) > FAR * reach
