@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array, as_batch
 from gough.kinematics import equivalent_struts
 from gough.modes.certificate import certify
-from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows
+from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, is_far
 from gough.modes.follow import SHARE, Ends, follow
 from gough.modes.frames import Frames
 from gough.modes.result import AssemblyModes, ModesStatus
@@ -163,6 +163,11 @@ class _Tracked:
         outcome.paths[row] = len(e), start.count - len(e) - away, away, 0
         outcome.status[row] = ModesStatus.COMPLETE
 
+    def beyond(self, squares: Array) -> NDArray[np.bool_]:
+        """(P,) paths of the only row that did not arrive, and are far beyond any pose."""
+        far = np.array([bool(is_far(t, squares)) for t in self.ends.t[0]])
+        return far & (self.ends.ends[0] != FINITE)
+
 
 def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
     """Track a chunk; returns the rows that were not clean."""
@@ -181,6 +186,14 @@ def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
             tracked.record(0, outcome, row)
             return
         tries.append(tracked)
+    # a solution far beyond any pose is believed to be lost if every route loses one there
+    squares = work.normalised(np.array([row]))[1][0]
+    gone = [one.beyond(squares) for one in tries]
+    if all(
+        np.all(far | (one.ends.ends[0] == FINITE)) for far, one in zip(gone, tries, strict=True)
+    ):
+        for far, one in zip(gone, tries, strict=True):
+            one.away[0] = far
     best = max(tries, key=lambda one: np.sum(one.ends.ends == FINITE))
     _record_singular(work, row, outcome, best)
 
@@ -243,8 +256,27 @@ def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) 
     row, pose, multiple = row[order], pose[order], multiple[order]
     rows = legs.reshape(-1, 6)
     proof = certify(platform, rows[row], pose)
+    _settle_doubts(outcome, row, multiple, proof.certified, start.count)
     return AssemblyModes(
         platform=platform, legs=legs, pose=pose, row=row, multiplicity=multiple,
         certificate=proof, status=outcome.status.reshape(legs.shape[:-1]),
         paths=outcome.paths.reshape(*legs.shape[:-1], 4), solutions=start.count,
     )  # fmt: skip
+
+
+def _settle_doubts(
+    outcome: _Outcome,
+    row: NDArray[np.int64],
+    multiple: NDArray[np.int32],
+    certified: NDArray[np.bool_],
+    solutions: int,
+) -> None:
+    """Poses that looked multiple but are proven to be alone are regular after all."""
+    for k in np.flatnonzero(outcome.status == ModesStatus.SINGULAR):
+        mine = row == k
+        multiple[mine & certified] = 1
+        regular, meet = np.sum(multiple[mine] == 1), np.sum(multiple[mine & (multiple > 1)])
+        away = outcome.paths[k, 2]
+        outcome.paths[k] = regular, solutions - regular - away - meet, away, meet
+        if not meet:
+            outcome.status[k] = ModesStatus.COMPLETE

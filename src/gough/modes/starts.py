@@ -13,6 +13,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,7 @@ class Start:
 
 
 _known: OrderedDict[tuple[str, int], Start] = OrderedDict()
+_lock = Lock()
 
 
 def start_of(platform: Platform, number: int = 0) -> Start:
@@ -73,12 +75,13 @@ def start_of(platform: Platform, number: int = 0) -> Start:
             paths to the same readings are different ones.
     """
     key = platform.digest, number
-    if key not in _known:
-        _known[key] = find_start(platform, SEED + number)
-        while len(_known) > CACHED:
-            _known.popitem(last=False)
-    _known.move_to_end(key)
-    return _known[key]
+    with _lock:
+        if key not in _known:
+            _known[key] = find_start(platform, SEED + number)
+            while len(_known) > CACHED:
+                _known.popitem(last=False)
+        _known.move_to_end(key)
+        return _known[key]
 
 
 @cache
