@@ -81,20 +81,25 @@ class _Work:
 
 @dataclass(frozen=True, eq=False)
 class _Outcome:
-    """Per row: status, counts of paths, normalised real poses."""
+    """Per row: status, counts of paths. Poses come in blocks, in any order of rows.
+
+    Attributes:
+        status: (N,); paths: (N, 4) real, complex, at infinity, singular.
+        blocks: rows (M,), normalised real poses (M, 4) and (M, 3), multiplicities (M,).
+    """
 
     status: NDArray[np.uint8]
-    paths: NDArray[np.int32]  # (N, 4): real, complex, at infinity, singular
-    poses: list[tuple[Array, Array]]
-    multiple: list[NDArray[np.int32]]
+    paths: NDArray[np.int32]
+    blocks: list[tuple[NDArray[np.int64], Array, Array, NDArray[np.int32]]]
 
     @classmethod
     def empty(cls, count: int) -> _Outcome:
-        none = (np.zeros((0, 4)), np.zeros((0, 3)))
-        return cls(
-            np.zeros(count, np.uint8), np.zeros((count, 4), np.int32), [none] * count,
-            [np.zeros(0, np.int32)] * count,
-        )  # fmt: skip
+        nothing = np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros(0, np.int32)
+        return cls(np.zeros(count, np.uint8), np.zeros((count, 4), np.int32), [nothing])
+
+    def add(self, rows: NDArray[np.int64], e: Array, t: Array, multiple: NDArray[np.int32]) -> None:
+        """Poses of some rows; a row's poses must come in one call."""
+        self.blocks.append((rows, e, t, multiple))
 
 
 def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int | None) -> None:
@@ -150,18 +155,21 @@ class _Tracked:
     away: NDArray[np.bool_]
     clean: NDArray[np.bool_]  # (n,)
 
-    def record(self, k: int, outcome: _Outcome, row: int) -> None:
-        """Poses of the clean row k, whose place among all is `row`, with mirror images."""
-        start, real, away = self.start, self.kind[k] == REAL, int(self.away[k].sum())
-        e, t = self.e[k][real], self.t[k][real]
+    def record(self, outcome: _Outcome, rows: NDArray[np.int64]) -> None:
+        """Poses of the clean rows, with mirror images; `rows` (n,) are their places among all."""
+        start, good = self.start, self.clean
+        real = (self.kind == REAL) & good[:, None]
+        where, e, t = np.broadcast_to(rows[:, None], real.shape)[real], self.e[real], self.t[real]
+        count, away = real.sum(axis=1), self.away.sum(axis=1)
         if start.paired:
-            away *= 2
             mirrored = start.frames.reflect(e, t)
+            where = np.concatenate([where, where])
             e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
-        outcome.poses[row] = e, t
-        outcome.multiple[row] = np.ones(len(e), np.int32)
-        outcome.paths[row] = len(e), start.count - len(e) - away, away, 0
-        outcome.status[row] = ModesStatus.COMPLETE
+            count, away = 2 * count, 2 * away
+        outcome.add(where, e, t, np.ones(len(e), np.int32))
+        paths = [count, start.count - count - away, away, 0 * away]
+        outcome.paths[rows[good]] = np.stack(paths, axis=1)[good]
+        outcome.status[rows[good]] = ModesStatus.COMPLETE
 
     def beyond(self, squares: Array) -> NDArray[np.bool_]:
         """(P,) paths of the only row that did not arrive, and are far beyond any pose."""
@@ -172,8 +180,7 @@ class _Tracked:
 def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
     """Track a chunk; returns the rows that were not clean."""
     tracked = _track(work, rows, work.start, SHARE)
-    for k in np.flatnonzero(tracked.clean):
-        tracked.record(int(k), outcome, int(rows[k]))
+    tracked.record(outcome, rows)
     return rows[~tracked.clean]
 
 
@@ -183,7 +190,7 @@ def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
     for share, number in AGAIN:
         tracked = _track(work, np.array([row]), start_of(work.platform, number), share)
         if tracked.clean[0]:
-            tracked.record(0, outcome, row)
+            tracked.record(outcome, np.array([row]))
             return
         tries.append(tracked)
     # a solution far beyond any pose is believed to be lost if every route loses one there
@@ -219,7 +226,7 @@ def _record_singular(work: _Work, row: int, outcome: _Outcome, tracked: _Tracked
     away = int(np.sum(far)) * (2 if start.paired else 1)
     doubtful = found.unresolved + lost + jumped > 0
     regular, meet = int(np.sum(multiple == 1)), int(multiple[multiple > 1].sum())
-    outcome.poses[row], outcome.multiple[row] = (e, t), multiple
+    outcome.add(np.full(len(e), row), e, t, multiple)
     outcome.paths[row] = regular, max(0, start.count - regular - meet - away), away, meet
     if found.curve:
         outcome.status[row] = ModesStatus.SELF_MOTION
@@ -239,17 +246,13 @@ def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _
         base, squares = work.normalised(np.array([row]))
         problem = Problem(frames.moving, base[0], squares[0], TOLERANCE)
         e, t = curve_of_poses(problem, home, SEED)
-        outcome.poses[row], outcome.multiple[row] = (e, t), np.zeros(len(e), np.int32)
+        outcome.add(np.full(len(e), row), e, t, np.zeros(len(e), np.int32))
         outcome.status[row] = ModesStatus.ALWAYS_SINGULAR
 
 
 def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) -> AssemblyModes:
     """Poses in the platform's coordinates, certified, nearest to home first in each row."""
-    counts = np.array([len(e) for e, _ in outcome.poses], dtype=np.int64)
-    row = np.repeat(np.arange(len(counts)), counts)
-    e = np.concatenate([*(e for e, _ in outcome.poses), np.zeros((0, 4))])
-    t = np.concatenate([*(t for _, t in outcome.poses), np.zeros((0, 3))])
-    multiple = np.concatenate([*outcome.multiple, np.zeros(0, np.int32)]).astype(np.int32)
+    row, e, t, multiple = (np.concatenate(parts) for parts in zip(*outcome.blocks, strict=True))
     pose = start.frames.pose(e, t)
     shift, turn = pose.distance(platform.home)
     order = np.lexsort((shift / platform.size + turn, row))
