@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gough.modes.choose import Choice
 
 LEGS = tuple(f"leg_{i}" for i in range(1, 7))
+WIDTH = 125  # of a table [characters]
 ROWS_PRINTED = 3  # sets of readings whose tables are printed
 
 
@@ -109,6 +110,8 @@ def _print(modes: AssemblyModes, choice: Choice) -> None:
     from rich.console import Console
 
     console = Console(soft_wrap=True)
+    # a narrow terminal may break lines, but no digit is left out
+    console = Console(soft_wrap=True, width=max(console.width, WIDTH))
     sets = 1 if modes.legs.ndim == 1 else len(modes.legs)
     for k in range(min(sets, ROWS_PRINTED)):
         console.print(_table(modes, choice, k))
@@ -130,10 +133,10 @@ def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
     table = Table(
         box=box.SIMPLE_HEAD, title=f"{modes.platform.name}: {status.label}", title_justify="left"
     )
-    headings = [f"x [{unit}]", "y", "z", "rx [deg]", "ry", "rz", "residual", "certified within"]
+    headings = [f"x [{unit}]", "y", "z", "rx [deg]", "ry", "rz", "residual", "radius"]
     for heading in ["pose", *headings, "sigma_min", "fails"]:
         table.add_column(heading, justify="left" if heading == "fails" else "right", no_wrap=True)
-    places = max(0, 6 - math.floor(math.log10(modes.platform.size)))
+    places = max(0, 5 - math.floor(math.log10(modes.platform.size)))
     euler = np.degrees(modes.pose.euler)
     certificate = modes.certificate
     mine = np.flatnonzero(modes.row == k)
@@ -143,7 +146,7 @@ def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
         table.add_row(
             str(choice.rank[i] + 1),
             *(f"{v:z.{places}f}" for v in modes.pose.position[i]),
-            *(f"{v:z.4f}" for v in euler[i]),
+            *(f"{v:z.3f}" for v in euler[i]),
             f"{modes.residual[i]:.1e}", proof, f"{modes.singularity_distance[i]:.2g}",
             ", ".join(fails) or "-",
         )  # fmt: skip
