@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from gough.modes.choose import Choice
 
 LEGS = tuple(f"leg_{i}" for i in range(1, 7))
-WIDTH = 125  # of a table [characters]
 ROWS_PRINTED = 3  # sets of readings whose tables are printed
 
 
@@ -110,11 +109,13 @@ def _print(modes: AssemblyModes, choice: Choice) -> None:
     from rich.console import Console
 
     console = Console(soft_wrap=True)
-    # a narrow terminal may break lines, but no digit is left out
-    console = Console(soft_wrap=True, width=max(console.width, WIDTH))
     sets = 1 if modes.legs.ndim == 1 else len(modes.legs)
     for k in range(min(sets, ROWS_PRINTED)):
-        console.print(_table(modes, choice, k))
+        table = _table(modes, choice, k)
+        # a narrow terminal may break lines, but no digit is left out
+        wanted = Console(width=1000).measure(table).maximum
+        console.width = max(console.width, wanted)
+        console.print(table)
         console.print(_summary(modes, choice, k))
     if sets > ROWS_PRINTED:
         found, whole = len(modes.row), int(modes.complete.sum())
