@@ -14,6 +14,7 @@ from gough.fk.layout import (
     OFFSET,
     ORDER,
     ORIGIN,
+    PER_SIZE,
     PIVOT,
     REST,
     ROD,
@@ -39,7 +40,7 @@ def take_reading(constants, legs, row, buffer, k, stride):
     for i in range(6):
         leg = int(constants[ORDER + i])
         reading = legs[row, leg] if valid else constants[REST + leg]
-        length = (reading + constants[OFFSET + i]) / constants[SIZE]
+        length = (reading + constants[OFFSET + i]) * constants[PER_SIZE]
         cosine, sine = 0.0, 0.0
         if constants[ROTARY] == 1:
             length = constants[ROD]
