@@ -36,7 +36,8 @@ def take_reading(constants, legs, row, buffer, k, stride):
     for i in range(6):
         reading = legs[row, int(constants[ORDER + i])]
         length = reading + constants[OFFSET + i]
-        valid &= np.isfinite(length) & ((length > 0) | (constants[ROTARY] == 1))
+        # by comparison, since Numba's isfinite is x - x == 0, which fast-math folds to True
+        valid &= (np.abs(length) < np.inf) & ((length > 0) | (constants[ROTARY] == 1))
     for i in range(6):
         leg = int(constants[ORDER + i])
         reading = legs[row, leg] if valid else constants[REST + leg]
