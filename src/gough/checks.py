@@ -54,6 +54,7 @@ def _first_non_number(value: object, place: str = "") -> tuple[str, object]:
 
 
 def platform_numbers(name: str, value: ArrayLike) -> Array:
+    """`value` as a float64 array of any shape, for a field of a platform."""
     try:
         return as_batch(name, value, ())
     except GoughError as error:

@@ -151,10 +151,7 @@ def pose_covariance(platform: Platform, pose: Pose, leg_noise: ArrayLike) -> Arr
         raise GoughError(f"leg_noise: expected a number, (6,) or (6, 6), got {noise.shape}")
     if not np.all(np.isfinite(noise)) or (noise.ndim < 2 and np.any(noise < 0)):
         raise GoughError(f"leg_noise: expected standard deviations of 0 or more, found {noise}")
-    if noise.ndim == 2:
-        covariance = noise
-    else:
-        covariance = np.diag(np.broadcast_to(noise, 6) ** 2)
+    covariance = noise if noise.ndim == 2 else np.diag(np.broadcast_to(noise, 6) ** 2)
     J = jacobian(platform, pose)
     rows, known = _finite_rows(J)
     regular = (known & (np.linalg.det(rows) != 0))[..., None, None]

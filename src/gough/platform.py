@@ -295,5 +295,6 @@ def _home(value: Pose | ArrayLike) -> Pose:
     if pose.batch:
         raise PlatformError(f"home: expected one pose, found batch axes {pose.batch}")
     return Pose(
-        platform_field("home.position", pose.position, (3,)), platform_field("home.wxyz", pose.wxyz, (4,))
+        platform_field("home.position", pose.position, (3,)),
+        platform_field("home.wxyz", pose.wxyz, (4,)),
     )

@@ -7,6 +7,7 @@ vectors; Euler angles are the paper's, R = Rx(a) Ry(b) Rz(c).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,8 +71,9 @@ class Pose:
     def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
         """From (..., 3) and Euler angles (..., 3) [rad], R = Rx(a) Ry(b) Rz(c)."""
         half = as_batch("angles", angles, (3,)) / 2
-        (ca, cb, cc), (sa, sb, sc) = np.moveaxis(np.cos(half), -1, 0), np.moveaxis(
-            np.sin(half), -1, 0
+        (ca, cb, cc), (sa, sb, sc) = (
+            np.moveaxis(np.cos(half), -1, 0),
+            np.moveaxis(np.sin(half), -1, 0),
         )
         w = ca * cb * cc - sa * sb * sc
         x = sa * cb * cc + ca * sb * sc
@@ -152,7 +154,7 @@ class Pose:
             raise TypeError("a single pose has no length; its batch axes are ()")
         return self.batch[0]
 
-    def __getitem__(self, index: object) -> Pose:
+    def __getitem__(self, index: Any) -> Pose:
         if not self.batch:
             raise IndexError("a single pose has no rows; its batch axes are ()")
         rows = index if isinstance(index, tuple) else (index,)

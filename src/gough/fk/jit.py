@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -23,14 +23,18 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
             user's cache folder can be written (and NUMBA_CACHE_DIR names no other), Numba
             cannot cache; the code is then compiled anew in every process.
     """
-    settings = {"nogil": True, "fastmath": FAST if fast else False, "error_model": "numpy"}
+    settings: dict[str, Any] = {
+        "nogil": True,
+        "fastmath": FAST if fast else False,
+        "error_model": "numpy",
+    }
 
     def decorate(function: Function) -> Function:
         try:
-            return numba.njit(cache=cache, **settings, **options)(function)
+            return numba.njit(cache=cache, **settings, **options)(function)  # pyright: ignore[reportReturnType]
         except RuntimeError as error:
             if "no locator" not in str(error):
                 raise
-            return numba.njit(**settings, **options)(function)
+            return numba.njit(**settings, **options)(function)  # pyright: ignore[reportReturnType]
 
     return decorate
