@@ -56,9 +56,13 @@ def _first_non_number(value: object, place: str = "") -> tuple[str, object]:
 def platform_numbers(name: str, value: ArrayLike) -> Array:
     """`value` as a float64 array of any shape, for a field of a platform."""
     try:
-        return as_batch(name, value, ())
+        array = as_batch(name, value, ())
     except GoughError as error:
         raise PlatformError(str(error)) from None
+    place, found = _first_non_number(value)  # NumPy takes [0, True] for two numbers
+    if place:
+        raise PlatformError(f"{name}{place}: expected a number, found {found!r}")
+    return array
 
 
 def platform_field(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -117,11 +117,19 @@ class Pose:
 
     @property
     def euler(self) -> Array:
-        """Euler angles (..., 3) [rad] with R = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2]."""
+        """Euler angles (..., 3) [rad] with R = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2].
+
+        From half the sum and half the difference of a and c, so that the angles describe the
+        rotation to rounding at b = +-pi/2 too, where only one of the two is determined
+        (Bernardes and Viollet 2022).
+        """
         w, x, y, z = np.moveaxis(self.wxyz, -1, 0)
-        a = np.arctan2(2 * (w * x - y * z), 1 - 2 * (x * x + y * y))
-        b = np.arcsin(np.clip(2 * (x * z + w * y), -1, 1))
-        c = np.arctan2(2 * (w * z - x * y), 1 - 2 * (y * y + z * z))
+        plus, minus = np.arctan2(x + z, w + y), np.arctan2(x - z, w - y)
+        b = 2 * np.arctan2(np.hypot(w + y, x + z), np.hypot(w - y, x - z)) - np.pi / 2
+        a, c = (
+            angle - 2 * np.pi * np.round(angle / (2 * np.pi))
+            for angle in (plus + minus, plus - minus)
+        )
         return np.stack([a, b, c], axis=-1)
 
     @property
@@ -158,7 +166,9 @@ class Pose:
         if not self.batch:
             raise IndexError("a single pose has no rows; its batch axes are ()")
         rows = index if isinstance(index, tuple) else (index,)
-        return Pose(self.position[(*rows, ..., slice(None))], self.wxyz[(*rows, ..., slice(None))])
+        if not any(i is Ellipsis for i in rows):
+            rows = (*rows, ...)
+        return Pose(self.position[(*rows, slice(None))], self.wxyz[(*rows, slice(None))])
 
     def apply(self, points: ArrayLike) -> Array:
         """R p + t for points (..., 3); the batch axes broadcast against the points' own."""
