@@ -57,7 +57,7 @@ def test_product_is_the_matrix_product_and_maps_points_in_turn(
 def test_rotations_are_rotations_and_quaternions_of_unit_length(pose: Pose) -> None:
     R = pose.rotation
     np.testing.assert_allclose(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape),
-                               atol=1e-15)  # fmt: skip
+                               atol=4e-15)  # fmt: skip
     np.testing.assert_allclose(np.linalg.det(R), 1.0, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(pose.wxyz, axis=-1), 1.0, rtol=1e-15)
 
@@ -72,10 +72,10 @@ def test_making_a_pose_from_its_own_parts_changes_no_bit(pose: Pose) -> None:
 @given(support.poses)
 def test_a_quaternion_and_its_negative_are_one_rotation(pose: Pose) -> None:
     other = Pose(pose.position, -pose.wxyz)
-    assert_same_pose(other, pose, 1e-15)
+    assert_same_pose(other, pose, 4e-15)
     shift, turn = pose.distance(other)
     assert np.all(shift == 0)
-    assert np.all(turn < 1e-15)
+    assert np.all(turn < 4e-15)
     np.testing.assert_allclose(np.cos(other.rotation_vector), np.cos(pose.rotation_vector),
                                atol=1e-14)  # fmt: skip
 
@@ -111,8 +111,8 @@ def test_exp_and_log_keep_their_digits_where_formulas_switch_to_series(
     """exp(x) = exp(x/2) exp(x/2): the two sides fall on different sides of the switch."""
     twist = support.random_twists(np.random.default_rng(seed), (), angle)
     half = Pose.exp(twist / 2)
-    assert_same_pose(Pose.exp(twist), half @ half, 2e-15)
-    np.testing.assert_allclose((half @ half).log(), twist, rtol=0, atol=3e-15)
+    assert_same_pose(Pose.exp(twist), half @ half, 8e-15)
+    np.testing.assert_allclose((half @ half).log(), twist, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("axis", np.eye(3).tolist())
@@ -143,7 +143,7 @@ def test_matrices_and_rotation_vectors_agree_with_scipy(pose: Pose) -> None:
     theirs = _scipy(pose)
     shape = pose.batch
     np.testing.assert_allclose(
-        pose.rotation, theirs.as_matrix().reshape(*shape, 3, 3), atol=2e-15, rtol=0
+        pose.rotation, theirs.as_matrix().reshape(*shape, 3, 3), atol=4e-15, rtol=0
     )
     ours = pose.rotation_vector.reshape(-1, 3)
     assert np.all(np.linalg.norm(ours, axis=-1) <= np.pi + 1e-15)
@@ -167,7 +167,7 @@ def test_euler_angles_are_rx_ry_rz(seed: int, batch: tuple[int, ...]) -> None:
     pose = Pose.from_euler(np.zeros(3), angles)
     theirs = Rotation.from_euler("XYZ", angles.reshape(-1, 3))  # capitals: Rx @ Ry @ Rz
     expected = theirs.as_matrix().reshape(*batch, 3, 3)
-    np.testing.assert_allclose(pose.rotation, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(pose.rotation, expected, rtol=0, atol=4e-15)
     np.testing.assert_allclose(pose.euler, angles, rtol=0, atol=1e-11)
 
 
@@ -179,7 +179,7 @@ def test_euler_angles_describe_the_rotation_at_gimbal_lock_too(
     pose = Pose.from_euler(np.zeros(3), (a, side * (np.pi / 2 - off), c))
     angles = pose.euler
     assert np.all(np.abs(angles) <= [np.pi, np.pi / 2, np.pi])
-    assert_same_pose(Pose.from_euler(np.zeros(3), angles), pose, 2e-15)
+    assert_same_pose(Pose.from_euler(np.zeros(3), angles), pose, 4e-15)
 
 
 @pytest.mark.parametrize("angle", [1e-300, 1e-12, 1e-6, 1e-3])
@@ -198,8 +198,8 @@ def test_distance_is_a_metric_that_no_change_of_base_frame_alters(
     a, b, c = triple
     (ab, turn_ab), (bc, turn_bc), (ac, turn_ac) = a.distance(b), b.distance(c), a.distance(c)
     assert np.all(a.distance(a)[0] == 0)
-    assert np.all(a.distance(a)[1] < 1e-15)
-    np.testing.assert_allclose(b.distance(a), (ab, turn_ab), rtol=1e-12, atol=1e-15)
+    assert np.all(a.distance(a)[1] < 4e-15)
+    np.testing.assert_allclose(b.distance(a), (ab, turn_ab), rtol=1e-12, atol=4e-15)
     assert np.all(ac <= ab + bc + 1e-12)
     assert np.all(turn_ac <= turn_ab + turn_bc + 1e-12)
     np.testing.assert_allclose((c @ a).distance(c @ b), (ab, turn_ab), rtol=1e-9, atol=1e-13)
