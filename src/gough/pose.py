@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gough.checks import Array, as_batch
+from gough.checks import LARGEST, Array, as_batch
 from gough.errors import GoughError
 
 SERIES_ANGLE = 0.3  # [rad] below it, series whose first dropped term is under 1e-15
@@ -36,13 +36,14 @@ class Pose:
         """Broadcasts the two against each other and normalises the quaternion.
 
         Raises:
-            GoughError: wrong shapes, or a quaternion that is zero.
+            GoughError: wrong shapes, or a quaternion of length zero or beyond 1e+-100.
         """
         t = as_batch("position", position, (3,))
         q = as_batch("wxyz", wxyz, (4,))
-        norm = np.linalg.norm(q, axis=-1, keepdims=True)
-        if np.any(norm == 0):
-            raise GoughError("wxyz: a quaternion of zeros is no rotation")
+        with np.errstate(over="ignore"):
+            norm = np.linalg.norm(q, axis=-1, keepdims=True)
+        if np.any((norm < 1 / LARGEST) | (norm > LARGEST)):
+            raise GoughError(_no_rotation(q, norm[..., 0]))
         # rows of unit length to rounding stay as they are: making a pose twice changes no bit
         q = q / np.where(np.abs(norm - 1) < 1e-15, 1.0, norm)
         batch = np.broadcast_shapes(t.shape[:-1], q.shape[:-1])
@@ -195,6 +196,13 @@ class Pose:
             return f"Pose(batch {self.batch})"
         numbers = [", ".join(f"{v:.9g}" for v in row) for row in (self.position, self.wxyz)]
         return f"Pose(position=({numbers[0]}), wxyz=({numbers[1]}))"
+
+
+def _no_rotation(wxyz: Array, norm: Array) -> str:
+    if np.any(norm == 0):
+        return "wxyz: a quaternion of zeros is no rotation"
+    found = wxyz[(norm < 1 / LARGEST) | (norm > LARGEST)][0].tolist()
+    return f"wxyz: expected a quaternion of about unit length, found {found}"
 
 
 def wxyz_product(a: Array, b: Array) -> Array:
