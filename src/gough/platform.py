@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,6 +59,23 @@ class Platform:
     pivot: Array | None = None
     workspace: Workspace | None = None
     rotary: RotaryArms | None = None
+
+    if TYPE_CHECKING:  # what may be passed is wider than what is held
+
+        def __init__(
+            self,
+            base: ArrayLike,
+            moving: ArrayLike,
+            home: Pose | ArrayLike = ...,
+            *,
+            unit: str = ...,
+            name: str = ...,
+            legs: LegKind = ...,
+            stroke: ArrayLike | None = ...,
+            pivot: ArrayLike | None = ...,
+            workspace: Workspace | None = ...,
+            rotary: RotaryArms | None = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +27,10 @@ class Workspace:
 
     translation: Array
     rotation_deg: Array
+
+    if TYPE_CHECKING:
+
+        def __init__(self, translation: ArrayLike, rotation_deg: ArrayLike) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("translation", "rotation_deg"):
