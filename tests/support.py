@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gough import Platform, Pose, RotaryArms, Workspace
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating]
 
 BATCHES: tuple[tuple[int, ...], ...] = ((), (1,), (3, 1, 2, 1))
 # [rad] no turn, turns whose squares or cubes vanish, ordinary turns, nearly and exactly half a turn

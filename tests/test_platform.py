@@ -416,7 +416,12 @@ def test_a_platform_cannot_be_changed(name: str) -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         platform.unit = "m"  # pyright: ignore[reportAttributeAccessIssue]
     parts = [platform, platform.home, platform.workspace, platform.rotary]
-    held = [getattr(part, f.name) for part in parts if part for f in dataclasses.fields(part)]
+    held = [
+        getattr(part, f.name)
+        for part in parts
+        if part is not None
+        for f in dataclasses.fields(part)
+    ]
     held += [platform.home_lengths, platform.home_legs, platform.pivot_point]
     arrays = [value for value in held if isinstance(value, np.ndarray)]
     assert len(arrays) >= 9
