@@ -4,13 +4,20 @@ A block that opens with ```python runs. Blocks of one page run in order and shar
 the next thing after it is a ```text block, that is what it must print: words exactly, numbers to
 six digits, `...` stands for anything. `<!-- not run: reason -->` on the line before a block keeps
 it from running.
+
+`python tests/documents.py README.md docs/start.md` writes what blocks print into their pages.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +36,7 @@ class Block:
     code: str
     line: int
     output: str | None
+    span: tuple[int, int] = (0, 0)  # where the output stands in the page
 
 
 def python_blocks(text: str) -> list[Block]:
@@ -40,7 +48,10 @@ def python_blocks(text: str) -> list[Block]:
             continue
         follows = after and after[1] == "text" and not text[here.end() : after.start()].strip()
         line = text.count("\n", 0, here.start()) + 2
-        blocks.append(Block(here[2], line, after[2] if after and follows else None))
+        if after and follows:
+            blocks.append(Block(here[2], line, after[2], after.span(2)))
+        else:
+            blocks.append(Block(here[2], line, None))
     return blocks
 
 
@@ -55,6 +66,16 @@ def run(page: Path, blocks: list[Block]) -> list[str]:
             exec(code, names)
         printed.append(out.getvalue())
     return printed
+
+
+def with_outputs(page: Path) -> str:
+    """The page with each output replaced by what its block prints here."""
+    text = page.read_text("utf-8")
+    blocks = python_blocks(text)
+    for block, printed in reversed(list(zip(blocks, run(page, blocks), strict=True))):
+        if block.output is not None and not same_output(printed, block.output):
+            text = text[: block.span[0]] + printed + text[block.span[1] :]
+    return text
 
 
 def same_output(printed: str, expected: str) -> bool:
@@ -80,3 +101,24 @@ def _same_word(a: str, b: str) -> bool:
     except ValueError:
         return False
     return abs(x - y) <= 1e-6 * max(abs(x), abs(y)) + 1e-12
+
+
+@contextlib.contextmanager
+def playground() -> Iterator[Path]:
+    """A folder with a copy of examples/, to run a page in; it is gone afterwards."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        if (ROOT / "examples").is_dir():
+            shutil.copytree(ROOT / "examples", Path(folder, "examples"))
+        os.chdir(folder)
+        try:
+            yield Path(folder)
+        finally:
+            os.chdir(before)
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        page = Path(name).resolve()
+        with playground():
+            page.write_text(with_outputs(page), "utf-8")

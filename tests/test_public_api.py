@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -99,14 +98,13 @@ def test_the_core_does_not_ask_for_torch() -> None:
 
 
 @pytest.mark.parametrize("page", documents.PAGES, ids=lambda p: str(p.relative_to(documents.ROOT)))
-def test_documents_run_and_print_what_they_say(page: Path, tmp_path: Path, monkeypatch) -> None:
+def test_documents_run_and_print_what_they_say(page: Path) -> None:
     blocks = documents.python_blocks(page.read_text("utf-8"))
     if not blocks:
         pytest.skip("no Python on this page")
-    if (documents.ROOT / "examples").is_dir():
-        shutil.copytree(documents.ROOT / "examples", tmp_path / "examples")
-    monkeypatch.chdir(tmp_path)
-    for block, printed in zip(blocks, documents.run(page, blocks), strict=True):
+    with documents.playground():
+        printed_by_block = documents.run(page, blocks)
+    for block, printed in zip(blocks, printed_by_block, strict=True):
         if block.output is not None:
             told = f"{page.name}:{block.line} printed\n{printed}\nbut the page says\n{block.output}"
             assert documents.same_output(printed, block.output), told
