@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
@@ -109,6 +110,16 @@ def _arms(base: Floats, size: float) -> RotaryArms:
 random_platforms = st.builds(
     random_platform, seeds, st.sampled_from(["telescopic", "length_change", "rotary"])
 )
+
+
+def assert_same_parts(a: object, b: object) -> None:
+    """Every field equal, bit for bit, without trusting `==` of the classes themselves."""
+    assert type(a) is type(b)
+    if dataclasses.is_dataclass(a):
+        for field in dataclasses.fields(a):
+            assert_same_parts(getattr(a, field.name), getattr(b, field.name))
+    else:
+        np.testing.assert_array_equal(a, b)  # pyright: ignore[reportArgumentType]
 
 
 def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:

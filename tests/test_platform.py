@@ -38,6 +38,7 @@ def test_the_catalog_has_every_machine() -> None:
 def test_catalog_machines_survive_their_own_toml(name: str, tmp_path: Path) -> None:
     platform = Platform.load(name)
     assert platform.name == name
+    support.assert_same_parts(from_toml(platform.to_toml()), platform)
     assert from_toml(platform.to_toml()) == platform
     assert from_toml(catalog_text(name)) == platform
     platform.save(tmp_path / "copy.toml")
@@ -49,6 +50,7 @@ def test_catalog_machines_survive_their_own_toml(name: str, tmp_path: Path) -> N
 @given(support.random_platforms)
 def test_any_platform_survives_its_own_toml(platform: Platform) -> None:
     again = from_toml(platform.to_toml())
+    support.assert_same_parts(again, platform)
     assert again == platform
     assert (again.digest, hash(again)) == (platform.digest, hash(platform))
     assert again.to_toml() == platform.to_toml()
@@ -365,6 +367,8 @@ def test_the_digest_is_the_same_in_every_version_and_on_every_machine() -> None:
 def test_the_digest_tells_every_fact_but_the_name(name: str) -> None:
     platform = Platform.load(name)
     digests = {platform.digest}
+    stated = {f.name for f in dataclasses.fields(platform) if getattr(platform, f.name) is not None}
+    assert platform.to_dict().keys() == stated
     changed = _each_number_nudged(platform.to_dict())
     for facts in changed:
         digests.add(from_toml(_toml(facts)).digest)
