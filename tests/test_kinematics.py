@@ -323,6 +323,10 @@ def test_the_unit_changes_no_digit_beyond_rounding(name: str, unit: str) -> None
     poses = support.sample(platform, (30,))
     there = Pose(factor * poses.position, poses.wxyz)
     assert np.all(other.in_workspace(there))
+    assert other.workspace is not None
+    corner = other.home.position + other.workspace.translation[:, 1]
+    assert other.in_workspace(Pose(corner, other.home.wxyz))
+    assert not other.in_workspace(Pose(corner + 1e-7 * other.size, other.home.wxyz))
     stretch = 1.0 if platform.legs == "rotary" else factor
     np.testing.assert_allclose(
         leg_lengths(other, there) / stretch, leg_lengths(platform, poses), rtol=0,
