@@ -39,13 +39,16 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.core: pyproject.toml | $(BIN)/python
-	$(PIP) -e .
+	@echo "Installing the core into $(VENV) ..."
+	@$(PIP) -e .
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) -c constraints.txt -e '.[dev,learn]'
+	@echo "Installing the development environment into $(VENV), a few minutes ..."
+	@$(PIP) -c constraints.txt -e '.[dev,learn]'
 	@touch $@ $(VENV)/.core
 
 $(VENV)/.docs: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) -c constraints.txt -e '.[docs]'
+	@echo "Installing what the documents need into $(VENV) ..."
+	@$(PIP) -c constraints.txt -e '.[docs]'
 	@touch $@ $(VENV)/.core

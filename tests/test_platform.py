@@ -459,9 +459,13 @@ def test_samples_are_in_the_workspace_and_fixed_by_the_seed(platform: Platform, 
     assert not np.allclose(poses.matrix, platform.sample_poses(50, seed=seed + 1).matrix)
 
 
-@pytest.mark.parametrize("name", CATALOG)
-def test_the_workspace_has_edges(name: str) -> None:
-    platform = Platform.load(name)
+LOPSIDED = REFERENCE.with_workspace(
+    [[-10, 50], [-5, 1], [0, 20]], [[-5, 30], [0, 10], [-40, 0]]
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("platform", [*map(Platform.load, CATALOG), LOPSIDED], ids=repr)
+def test_the_workspace_has_edges(platform: Platform) -> None:
     space, home = platform.workspace, platform.home
     assert space is not None
     for axis, (low, high) in enumerate(space.translation):
