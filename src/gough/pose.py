@@ -50,6 +50,14 @@ class Pose:
         object.__setattr__(self, "position", np.broadcast_to(t, (*batch, 3)))
         object.__setattr__(self, "wxyz", np.broadcast_to(q, (*batch, 4)))
 
+    @classmethod
+    def trusted(cls, position: Array, wxyz: Array) -> Pose:
+        """From arrays known to be right -- equal batch axes, unit quaternions -- unchecked."""
+        pose = object.__new__(cls)
+        object.__setattr__(pose, "position", position)
+        object.__setattr__(pose, "wxyz", wxyz)
+        return pose
+
     # ---- made from --------------------------------------------------------------------
 
     @classmethod
@@ -175,6 +183,10 @@ class Pose:
         """R p + t for points (..., 3); the batch axes broadcast against the points' own."""
         p = as_batch("points", points, (3,))
         return (self.rotation @ p[..., None])[..., 0] + self.position
+
+    def copy(self) -> Pose:
+        """A pose with arrays of its own."""
+        return Pose.trusted(self.position.copy(), self.wxyz.copy())
 
     def inverse(self) -> Pose:
         """The pose that undoes this one."""
