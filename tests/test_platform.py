@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -227,6 +228,11 @@ WRONG_TOML = {
     "skew axes": (
         ROTARY_TOML.replace("0.8660247", "0.9"),
         "rotary.axis_x[0], axis_y[0]: expected two unit vectors at right angles, found [0.9",
+    ),
+    "axes not square": (
+        re.sub("axis_x = (.*)axis_y = .*branch", r"axis_x = \1axis_y = \1branch", ROTARY_TOML,
+               flags=re.DOTALL),
+        "rotary.axis_x[0], axis_y[0]: expected two unit vectors at right angles, found [0.8660",
     ),
     "motor stroke": (
         "stroke = [1.0, 2.0]\n" + ROTARY_TOML,

@@ -45,6 +45,12 @@ def test_public_names_are_those_that_type_checkers_see() -> None:
     assert all(getattr(gough, name) is value for name, value in seen.items())
 
 
+def test_every_public_name_is_in_the_documents() -> None:
+    page = (documents.ROOT / "docs" / "api.md").read_text("utf-8")
+    missing = [n for n in gough.__all__ if f":: gough.{n}\n" not in page and n != "__version__"]
+    assert not missing, "docs/api.md lacks an entry for each of these"
+
+
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'gough' has no attribute 'sovle'"):
         gough.sovle  # noqa: B018 # pyright: ignore[reportAttributeAccessIssue]

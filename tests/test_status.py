@@ -39,6 +39,7 @@ def test_counts_tell_each_status_that_occurs() -> None:
     found = _solution(Status.UNREACHABLE, Status.CONVERGED, Status.UNREACHABLE)
     assert found.counts() == {Status.CONVERGED: 1, Status.UNREACHABLE: 2}
     assert found.usable.tolist() == [False, True, False]
+    assert _solution(*Status).usable.tolist() == [s.usable for s in Status]
     assert repr(found) == "Solution(batch (3,); converged: 1, unreachable: 2)"
 
 
