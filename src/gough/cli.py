@@ -6,21 +6,12 @@ import os
 import signal
 import sys
 from importlib import import_module
-from types import FrameType
 
 import gough
-from gough.commands import COMMANDS
+from gough.commands import COMMANDS, stopping
 from gough.errors import GoughError
 
-SOME_FAILED, BAD_USAGE, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
-
-
-class Terminated(BaseException):
-    """The process was asked to end; passes through every `finally` on its way out."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.number = number
+BAD_USAGE, BROKEN_PIPE = 2, 141
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -30,11 +21,8 @@ def main(arguments: list[str] | None = None) -> None:
     or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 told to terminate.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _terminate)
-    code = _guarded(given)
-    sys.exit(code)
+    stopping.listen()
+    sys.exit(_guarded(given))
 
 
 def _guarded(arguments: list[str]) -> int:
@@ -46,12 +34,8 @@ def _guarded(arguments: list[str]) -> int:
         return code
     except GoughError as error:
         return _complain(f"{name}: error: {error}")
-    except KeyboardInterrupt:
-        _complain(f"{name}: interrupted; no file was changed")
-        return INTERRUPTED
-    except Terminated as error:
-        _complain(f"{name}: terminated; no file was changed")
-        return 128 + error.number
+    except stopping.Stopped as stop:
+        return _stopped(name, stop.number)
     except BrokenPipeError:
         _drop_output()
         return BROKEN_PIPE
@@ -61,6 +45,17 @@ def _guarded(arguments: list[str]) -> int:
         _drop_output()
         where = f"{error.filename}: " if error.filename else ""
         return _complain(f"{name}: error: {where}{error.strerror or error}")
+    except Exception:
+        number = stopping.asked()
+        if number is None:
+            raise
+        return _stopped(name, number)  # a library made another error of it
+
+
+def _stopped(name: str, number: int) -> int:
+    how = "interrupted" if number == signal.SIGINT else "terminated"
+    _complain(f"{name}: {how}; no file was changed")
+    return 128 + number
 
 
 def _dispatch(arguments: list[str]) -> int:
@@ -115,10 +110,6 @@ def _drop_output() -> None:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, sys.stdout.fileno())
     os.close(null)
-
-
-def _terminate(number: int, frame: FrameType | None) -> None:
-    raise Terminated(number)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ from rich.box import Box
 from rich.console import Console
 from rich.table import Table
 
+from gough.commands import stopping
+
 if TYPE_CHECKING:
     from gough.files.jobs import Progress as Tick
     from gough.files.report import Report
@@ -116,10 +118,14 @@ def _decimals(size: float) -> int:
 
 
 @contextmanager
-def progress_bar() -> Iterator[Tick | None]:
-    """A bar with rate and remaining time on standard error; None where that is no terminal."""
+def progress_bar() -> Iterator[Tick]:
+    """What to call after every block of rows.
+
+    It draws a bar with rate and remaining time on standard error, if that is a terminal, and
+    ends the command if a signal has asked for it.
+    """
     if not sys.stderr.isatty():
-        yield None
+        yield lambda source, report: stopping.check()
         return
     from rich.progress import (
         BarColumn,
@@ -136,5 +142,6 @@ def progress_bar() -> Iterator[Tick | None]:
         def update(source: Source, report: Report) -> None:
             rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"
             bar.update(task, completed=source.done, total=source.total, rate=rate)
+            stopping.check()
 
         yield update

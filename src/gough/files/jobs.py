@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.files.block import Block
+from gough.files.block import Block, number_column
 from gough.files.identity import check_same, describe
 from gough.files.names import (
     DEVIATIONS,
@@ -86,7 +86,12 @@ def solve_file(
         solution = solve(platform, readings, **solver)  # pyright: ignore[reportArgumentType]
         status = solution.status
         report.add(solution.pose, readings, status, solution.residual)
-        _name(report, block, status == Status.INVALID_INPUT, lambda i: _bad_legs(readings[i]))
+        _name(
+            report,
+            block,
+            status == Status.INVALID_INPUT,
+            lambda i: _bad_legs(readings[i]),
+        )
         return solution_columns(platform, solution, angles, leg_noise)
 
     report = Report(SOLVED, head)
@@ -127,7 +132,7 @@ def inverse_file(
         status = _placed(platform, pose, readings)
         report.add(pose, readings, status)
         _name(report, block, status == INVALID, reasons)
-        columns = {name: pa.array(readings[:, i]) for i, name in enumerate(LEGS)}
+        columns = {name: number_column(readings[:, i]) for i, name in enumerate(LEGS)}
         return columns | {STATUS: _labels(PLACED, status)}
 
     report = Report(PLACED, head)
@@ -137,7 +142,10 @@ def inverse_file(
 
 
 def solution_columns(
-    platform: Platform, solution: Solution, angles: Angles | None, leg_noise: float | None
+    platform: Platform,
+    solution: Solution,
+    angles: Angles | None,
+    leg_noise: float | None,
 ) -> dict[str, pa.Array]:
     """The output columns of solved rows; see `solve_file`."""
     pose = solution.pose
@@ -145,18 +153,24 @@ def solution_columns(
     if angles == "deg":
         turn = np.degrees(turn)
     values = np.concatenate([pose.position, turn], axis=-1)
-    columns = {name: pa.array(values[:, i]) for i, name in enumerate(_pose_names(angles))}
+    columns = {
+        name: number_column(values[:, i]) for i, name in enumerate(_pose_names(angles))
+    }
     columns[STATUS] = _labels(SOLVED, solution.status)
-    columns["residual"] = pa.array(solution.residual)
-    columns["iterations"] = pa.array(solution.iterations)
+    columns["residual"] = number_column(solution.residual)
+    columns["iterations"] = number_column(solution.iterations)
     if leg_noise is not None:
         covariance = pose_covariance(platform, pose, leg_noise)
         deviations = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-        columns |= {name: pa.array(deviations[:, i]) for i, name in enumerate(DEVIATIONS)}
+        columns |= {
+            name: number_column(deviations[:, i]) for i, name in enumerate(DEVIATIONS)
+        }
     return columns
 
 
-def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Callable[[int], str]]:
+def poses_from_columns(
+    values: Array, names: Sequence[str]
+) -> tuple[Pose, Callable[[int], str]]:
     """Poses, NaN where a row is none, and a function that says what is wrong with row i.
 
     Args:
@@ -173,7 +187,8 @@ def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Calla
     def reason(i: int) -> str:
         for name, value in zip(names, values[i], strict=True):
             if not np.isfinite(value):
-                return f"{name} is {value}, expected a finite number"
+                found = "empty or not a number" if np.isnan(value) else value
+                return f"{name} is {found}, expected a finite number"
         length = np.linalg.norm(values[i, 3:])
         return f"the quaternion's length is {length:.6g}, expected 1"
 
@@ -181,7 +196,9 @@ def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Calla
     position, turn = clean[:, :3], clean[:, 3:]
     if rotation == QUATERNION:
         return Pose(position, turn), reason
-    return Pose.from_euler(position, np.radians(turn) if rotation == EULER_DEG else turn), reason
+    return Pose.from_euler(
+        position, np.radians(turn) if rotation == EULER_DEG else turn
+    ), reason
 
 
 def _run(
@@ -206,7 +223,11 @@ def _run(
         sink = stack.enter_context(open_sink(out, describe(platform))) if out else None
         typed = out is not None and file_format(out) == ".parquet"
         blocks = source.blocks(
-            numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows, typed=typed
+            numbers,
+            keep,
+            rows=reading.block_rows,
+            keep_bad=reading.keep_bad_rows,
+            typed=typed,
         )
         _pump(source, blocks, keep, step, sink, tick)
 
@@ -253,7 +274,9 @@ def _pose_names(angles: Angles | None) -> tuple[str, ...]:
 
 def _labels(outcomes: Sequence[Outcome], status: NDArray[np.uint8]) -> pa.Array:
     labels = pa.array([outcome.label for outcome in outcomes])
-    return labels.take(pa.array(status))
+    return pa.DictionaryArray.from_arrays(
+        number_column(status.astype(np.int32)), labels
+    ).cast(pa.string())
 
 
 def _placed(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.uint8]:
@@ -262,27 +285,35 @@ def _placed(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.uint8
     status[~platform.in_workspace(pose)] = OUTSIDE_WORKSPACE
     if platform.stroke is not None:
         low, high = platform.stroke.T
-        slack = 1e-12 * np.maximum(np.abs(low), np.abs(high))  # limits written with their digits
-        status[np.any((readings < low - slack) | (readings > high + slack), axis=-1)] = (
-            OUTSIDE_STROKE
-        )
+        slack = 1e-12 * np.maximum(
+            np.abs(low), np.abs(high)
+        )  # limits written with their digits
+        status[
+            np.any((readings < low - slack) | (readings > high + slack), axis=-1)
+        ] = OUTSIDE_STROKE
     status[~np.all(np.isfinite(readings), axis=-1)] = UNREACHABLE
     status[np.isnan(pose.position[:, 0])] = INVALID
     return status
 
 
 def _name(
-    report: Report, block: Block, invalid: NDArray[np.bool_], reason: Callable[[int], str]
+    report: Report,
+    block: Block,
+    invalid: NDArray[np.bool_],
+    reason: Callable[[int], str],
 ) -> None:
     """Describe invalid rows, as long as the report has room."""
     for i in np.flatnonzero(invalid)[: NAMED - len(report.invalid)]:
         row = int(i)
-        report.invalid.append(f"{block.place(row)}: {block.bad.get(row) or reason(row)}")
+        report.invalid.append(
+            f"{block.place(row)}: {block.bad.get(row) or reason(row)}"
+        )
 
 
 def _bad_legs(readings: Array) -> str:
     for name, value in zip(LEGS, readings, strict=True):
         if not np.isfinite(value):
-            return f"{name} is {value}, expected a finite number"
+            found = "empty or not a number" if np.isnan(value) else value
+            return f"{name} is {found}, expected a finite number"
     low = int(np.argmin(readings))
     return f"{LEGS[low]} is {readings[low]:.9g}, which makes no leg longer than 0"

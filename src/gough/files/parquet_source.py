@@ -33,13 +33,20 @@ class ParquetSource:
         try:
             # without pre_buffer and with a small buffer a row group is read page by page, so
             # that memory does not grow with its size
-            self._file = pq.ParquetFile(file, pre_buffer=False, buffer_size=PAGE_BUFFER)
+            self._file = pq.ParquetFile(
+                file,
+                pre_buffer=False,
+                buffer_size=PAGE_BUFFER,
+                page_checksum_verification=True,
+            )
         except (pa.ArrowException, OSError) as error:
             raise InputError(f"{where}: {_not_parquet(file, error)}") from None
         self._schema = self._file.schema_arrow
         self.columns: list[str] = list(self._schema.names)
         raw = self._file.metadata.metadata or {}
-        self.metadata = {k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()}
+        self.metadata = {
+            k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()
+        }
         self.total: int | None = self._file.metadata.num_rows
         if not self.total:
             raise InputError(f"{where}: holds no rows; expected a row per pose")
@@ -89,11 +96,18 @@ class ParquetSource:
         kind = self._schema.field(name).type
         if pa.types.is_dictionary(kind):
             kind = kind.value_type
-        tests = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
+        tests = (
+            pa.types.is_integer,
+            pa.types.is_floating,
+            pa.types.is_decimal,
+            pa.types.is_null,
+        )
         if any(test(kind) for test in tests):
             return
         first = self._next(self._file.iter_batches(batch_size=1, columns=[name]))
-        found = f"{first.column(0)[0].as_py()!r:.60}" if first is not None else "nothing"
+        found = (
+            f"{first.column(0)[0].as_py()!r:.60}" if first is not None else "nothing"
+        )
         raise InputError(
             f"{self.where}: column {name}: holds {kind}, expected numbers; row 1 has {found}; "
             "convert the column to float64"

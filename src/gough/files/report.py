@@ -65,10 +65,18 @@ class Report:
     @property
     def failures(self) -> int:
         """Rows whose answer cannot be used."""
-        return sum(int(n) for n, o in zip(self.counts, self.outcomes, strict=True) if not o.usable)
+        return sum(
+            int(n)
+            for n, o in zip(self.counts, self.outcomes, strict=True)
+            if not o.usable
+        )
 
     def add(
-        self, pose: Pose, legs: Array, status: NDArray[np.uint8], residual: Array | None = None
+        self,
+        pose: Pose,
+        legs: Array,
+        status: NDArray[np.uint8],
+        residual: Array | None = None,
     ) -> None:
         """Count a block of rows."""
         self.counts += np.bincount(status, minlength=len(self.outcomes))

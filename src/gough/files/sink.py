@@ -100,7 +100,9 @@ class ParquetSink:
     def close(self) -> None:
         """Let go of the writer; after `finish` this does nothing."""
         if self._writer is not None and self._writer.is_open:
-            with suppress(Exception):  # it tries to write a footer to a file that may be full
+            with suppress(
+                Exception
+            ):  # it tries to write a footer to a file that may be full
                 self._writer.close()
 
     def _flush(self) -> None:
@@ -121,6 +123,7 @@ def _parquet_writer(
         "compression": "zstd",
         "use_dictionary": [STATUS] if STATUS in schema.names else False,
         "use_byte_stream_split": floats,
+        "write_page_checksum": True,  # damage on the way is noticed when the file is read
     }
     writer = pq.ParquetWriter(file, schema.with_metadata(None), **options)
     writer.add_key_value_metadata(dict(metadata))
@@ -135,7 +138,8 @@ def _header(names: list[str]) -> bytes:
 
 def _csv_rows(table: pa.Table) -> bytes:
     columns = [
-        c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c for c in table.columns
+        c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c
+        for c in table.columns
     ]
     table = pa.table(columns, names=table.column_names)
     # pyarrow's "needed" quotes all text; try without, which it refuses where quotes are needed
@@ -146,10 +150,16 @@ def _csv_rows(table: pa.Table) -> bytes:
             pacsv.write_csv(table, buffer, options)
         except pa.ArrowInvalid as error:
             if style == "needed":
-                raise GoughError(f"cannot be written as CSV: {error}; write .parquet") from None
+                raise GoughError(
+                    f"cannot be written as CSV: {error}; write .parquet"
+                ) from None
         except pa.ArrowNotImplementedError:
-            kinds = ", ".join(f"{f.name} ({f.type})" for f in table.schema if _nested(f.type))
-            raise GoughError(f"a kept column cannot be CSV: {kinds}; write .parquet") from None
+            kinds = ", ".join(
+                f"{f.name} ({f.type})" for f in table.schema if _nested(f.type)
+            )
+            raise GoughError(
+                f"a kept column cannot be CSV: {kinds}; write .parquet"
+            ) from None
         else:
             return buffer.getvalue().to_pybytes()
     raise AssertionError("one of the two styles returns or raises")
