@@ -273,7 +273,7 @@ class Platform:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Platform):
             return NotImplemented
-        return self.to_dict() == other.to_dict()
+        return self is other or (self.digest == other.digest and self.name == other.name)
 
     def __hash__(self) -> int:
         return hash(self.digest)

@@ -48,6 +48,14 @@ class Pose:
         object.__setattr__(self, "position", np.broadcast_to(t, (*batch, 3)))
         object.__setattr__(self, "wxyz", np.broadcast_to(q, (*batch, 4)))
 
+    @classmethod
+    def trusted(cls, position: Array, wxyz: Array) -> Pose:
+        """From arrays known to be right -- equal batch axes, unit quaternions -- unchecked."""
+        pose = object.__new__(cls)
+        object.__setattr__(pose, "position", position)
+        object.__setattr__(pose, "wxyz", wxyz)
+        return pose
+
     # ---- made from --------------------------------------------------------------------
 
     @classmethod
