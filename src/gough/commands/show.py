@@ -137,7 +137,7 @@ def progress_bar() -> Iterator[Tick]:
 
     columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"))
     with Progress(*columns, TimeRemainingColumn(), console=console(errors=True)) as bar:
-        task = bar.add_task("", total=None, rate="")
+        task = bar.add_task("", total=None, rate="starting (a first run compiles)")
 
         def update(source: Source, report: Report) -> None:
             rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"

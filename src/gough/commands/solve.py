@@ -59,7 +59,7 @@ def run(
     from gough.platform import Platform
 
     machine = Platform.load(platform)
-    solver = {"seed": seed, "tolerance": tolerance, "max_iterations": max_iterations}
+    solver = {"seed": seed, "tol": tolerance, "max_iterations": max_iterations}
     given = {name: value for name, value in solver.items() if value is not None}
     with show.progress_bar() as progress:
         report = solve_file(

@@ -34,9 +34,7 @@ class Block:
 
         A value that is absent is NaN, and so is all of a row that could not be read.
         """
-        array = np.stack(
-            [number_array(self.table.column(name)) for name in names], axis=-1
-        )
+        array = np.stack([number_array(self.table.column(name)) for name in names], axis=-1)
         array[list(self.bad)] = np.nan
         return array
 
@@ -48,7 +46,7 @@ def to_float(column: pa.ChunkedArray) -> pa.ChunkedArray:
     return column.cast(pa.float64(), safe=False)
 
 
-# pa.array and to_numpy would do for the next two, but they import pandas where that is
+# pa.array and to_numpy would do for the next three, but they import pandas where that is
 # installed, for nothing: half a second.
 
 
@@ -63,3 +61,13 @@ def number_column(values: np.ndarray) -> pa.Array:
     kind = {"f": pa.float64(), "i": pa.int32()}[values.dtype.kind]
     exact = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
     return pa.Array.from_buffers(kind, len(exact), [None, pa.py_buffer(exact)])
+
+
+def label_column(codes: np.ndarray, labels: Sequence[str]) -> pa.Array:
+    """Words (N,), each `labels[code]`, as a column of text."""
+    words = [label.encode() for label in labels]
+    ends = np.cumsum([0, *map(len, words)], dtype=np.int32)
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(words))]
+    dictionary = pa.Array.from_buffers(pa.string(), len(words), buffers)
+    rows = number_column(codes.astype(np.int32))
+    return pa.DictionaryArray.from_arrays(rows, dictionary).cast(pa.string())

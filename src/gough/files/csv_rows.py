@@ -37,18 +37,14 @@ class Layout:
     types: dict[str, pa.DataType] = field(default_factory=dict)
 
 
-def split_rows(
-    layout: Layout, data: bytes, first_line: int
-) -> Iterator[tuple[int, list[str]]]:
+def split_rows(layout: Layout, data: bytes, first_line: int) -> Iterator[tuple[int, list[str]]]:
     """(line, fields) of every row that is not empty.
 
     Raises:
         InputError: a quoted field without an end.
     """
     text = data.decode("utf-8", errors="surrogateescape")
-    reader = csv.reader(
-        io.StringIO(text, newline=""), delimiter=layout.delimiter, strict=True
-    )
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=layout.delimiter, strict=True)
     line = first_line
     try:
         for fields in reader:
@@ -74,17 +70,13 @@ def read_rows(
         InputError: file, line, column, what was found and what was expected.
     """
     columns: dict[str, list] = {name: [] for name in layout.types}
-    places = [
-        (name, layout.header.index(name), kind) for name, kind in layout.types.items()
-    ]
+    places = [(name, layout.header.index(name), kind) for name, kind in layout.types.items()]
     lines: list[int] = []
     bad: dict[int, str] = {}
     for line, fields in split_rows(layout, data, first_line):
         wrong = _wrong_width(layout, fields)
         for name, place, kind in places:
-            value, reason = (
-                (_absent(kind), "") if wrong else _parse(name, fields[place], kind)
-            )
+            value, reason = (_absent(kind), "") if wrong else _parse(name, fields[place], kind)
             columns[name].append(value)
             wrong = wrong or reason
         if wrong and not keep_bad:
@@ -94,9 +86,7 @@ def read_rows(
         if wrong:
             bad[len(lines)] = wrong
         lines.append(line)
-    table = pa.table(
-        {name: pa.array(columns[name], kind) for name, kind in layout.types.items()}
-    )
+    table = pa.table({name: pa.array(columns[name], kind) for name, kind in layout.types.items()})
     return table, lines, bad
 
 
@@ -104,9 +94,7 @@ def _wrong_width(layout: Layout, fields: list[str]) -> str:
     found, expected = len(fields), len(layout.header)
     if found == expected:
         return ""
-    return (
-        f"found {found} field{'s' * (found != 1)}, expected {expected} as in the header"
-    )
+    return f"found {found} field{'s' * (found != 1)}, expected {expected} as in the header"
 
 
 def _absent(kind: pa.DataType) -> object:
@@ -125,9 +113,7 @@ def _parse(name: str, text: str, kind: pa.DataType) -> tuple[object, str]:
     if bare in MISSING:
         return _absent(kind), ""
     try:
-        if (
-            "_" in bare or not bare.isascii()
-        ):  # Python reads 1_000, CSV files do not mean it
+        if "_" in bare or not bare.isascii():  # Python reads 1_000, CSV files do not mean it
             raise ValueError
         return (int(bare) if pa.types.is_integer(kind) else float(bare)), ""
     except ValueError:
@@ -135,9 +121,7 @@ def _parse(name: str, text: str, kind: pa.DataType) -> tuple[object, str]:
 
 
 def _not_a_number(name: str, text: str, kind: pa.DataType) -> str:
-    shown = repr(
-        text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")[:40]
-    )
+    shown = repr(text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")[:40])
     wanted = "a whole number" if pa.types.is_integer(kind) else "a number"
     reason = f"column {name}: found {shown}, expected {wanted}"
     if text.count(",") == 1 and text.replace(",", "").strip().lstrip("+-").isdigit():

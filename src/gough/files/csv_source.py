@@ -15,9 +15,7 @@ from gough.files.block import Block
 from gough.files.csv_rows import MISSING, Layout, read_rows, split_rows
 
 HEAD = 1 << 16  # bytes read to find the header
-LONGEST_LINE = (
-    1 << 24
-)  # bytes; a "line" beyond it means wrong line ends or an open quote
+LONGEST_LINE = 1 << 24  # bytes; a "line" beyond it means wrong line ends or an open quote
 DELIMITERS = (",", ";", "\t", "|")
 COMPRESSED = {
     b"\x1f\x8b": "gzip",
@@ -54,9 +52,7 @@ class CsvSource:
         while not self._rest.strip():
             more = self._read(HEAD)
             if not more:
-                raise InputError(
-                    f"{where}: holds a header and no rows; expected a row per pose"
-                )
+                raise InputError(f"{where}: holds a header and no rows; expected a row per pose")
             self._rest += more
 
     def blocks(
@@ -79,23 +75,15 @@ class CsvSource:
         Raises:
             InputError: with the line, the column and what was found.
         """
-        types = {name: pa.string() for name in keep} | {
-            name: pa.float64() for name in numbers
-        }
+        types = {name: pa.string() for name in keep} | {name: pa.float64() for name in numbers}
         # pyarrow catches Ctrl-C itself while it reads CSV, and loses it in blocks this small
         pa.enable_signal_handlers(False)
         for line, data in self._chunks(rows):
             if typed:
-                types |= self._number_types(
-                    data, line, [k for k in keep if k not in numbers]
-                )
+                types |= self._number_types(data, line, [k for k in keep if k not in numbers])
                 typed = False
-            layout = Layout(
-                self.where, self._layout.header, self._layout.delimiter, types
-            )
-            block = _quick_block(layout, data, line) or _slow_block(
-                layout, data, line, keep_bad
-            )
+            layout = Layout(self.where, self._layout.header, self._layout.delimiter, types)
+            block = _quick_block(layout, data, line) or _slow_block(layout, data, line, keep_bad)
             if len(block):
                 yield block
 
@@ -110,9 +98,7 @@ class CsvSource:
         try:
             data = self._file.read(count)
         except OSError as error:
-            raise InputError(
-                f"{self.where}: cannot be read: {error.strerror}"
-            ) from None
+            raise InputError(f"{self.where}: cannot be read: {error.strerror}") from None
         self.done += len(data)
         return data
 
@@ -124,9 +110,7 @@ class CsvSource:
                 return start, b""
             start += more
             if len(start) > LONGEST_LINE:
-                raise InputError(
-                    f"{self.where}: line 1 has no end; expected lines of text"
-                )
+                raise InputError(f"{self.where}: line 1 has no end; expected lines of text")
         return start[:end], start[end:]
 
     def _chunks(self, rows: int) -> Iterator[tuple[int, bytes]]:
@@ -156,15 +140,11 @@ class CsvSource:
 
     # ---- kept columns -----------------------------------------------------------------
 
-    def _number_types(
-        self, data: bytes, line: int, keep: list[str]
-    ) -> dict[str, pa.DataType]:
+    def _number_types(self, data: bytes, line: int, keep: list[str]) -> dict[str, pa.DataType]:
         """Types of kept columns that hold nothing but whole or decimal numbers."""
         types = {name: pa.string() for name in keep}
         layout = Layout(self.where, self._layout.header, self._layout.delimiter, types)
-        table = (
-            _quick_block(layout, data, line) or _slow_block(layout, data, line, True)
-        ).table
+        table = (_quick_block(layout, data, line) or _slow_block(layout, data, line, True)).table
         return {name: _number_type(table.column(name)) for name in keep}
 
 
@@ -188,9 +168,7 @@ def _quick_block(layout: Layout, data: bytes, line: int) -> Block | None:
         table = pacsv.read_csv(
             pa.BufferReader(data),
             read_options=pacsv.ReadOptions(column_names=layout.header),
-            parse_options=pacsv.ParseOptions(
-                delimiter=layout.delimiter, newlines_in_values=quoted
-            ),
+            parse_options=pacsv.ParseOptions(delimiter=layout.delimiter, newlines_in_values=quoted),
             convert_options=pacsv.ConvertOptions(
                 column_types=layout.types,
                 include_columns=list(layout.types),
@@ -200,9 +178,7 @@ def _quick_block(layout: Layout, data: bytes, line: int) -> Block | None:
         )
     except pa.ArrowInvalid:
         return None
-    regular = (
-        not quoted and data.count(b"\n") + (not data.endswith(b"\n")) == table.num_rows
-    )
+    regular = not quoted and data.count(b"\n") + (not data.endswith(b"\n")) == table.num_rows
 
     def place(row: int) -> str:
         if regular:
@@ -246,13 +222,9 @@ def _check_text(where: str, start: bytes) -> None:
         InputError: empty, Parquet, compressed, UTF-16 or another binary file.
     """
     if not start.strip():
-        raise InputError(
-            f"{where}: is empty; expected a header line and a row per pose"
-        )
+        raise InputError(f"{where}: is empty; expected a header line and a row per pose")
     if start.startswith(b"PAR1"):
-        raise InputError(
-            f"{where}: holds Parquet, not CSV; rename it to end in .parquet"
-        )
+        raise InputError(f"{where}: holds Parquet, not CSV; rename it to end in .parquet")
     for magic, name in COMPRESSED.items():
         if start.startswith(magic):
             raise InputError(f"{where}: is compressed ({name}); unpack it first")
@@ -272,14 +244,10 @@ def _layout(where: str, header: bytes) -> Layout:
         ) from None
     text = text.rstrip("\r\n")
     if "\r" in text:
-        raise InputError(
-            f"{where}: its lines end in CR alone; save it with LF or CRLF line ends"
-        )
+        raise InputError(f"{where}: its lines end in CR alone; save it with LF or CRLF line ends")
     delimiter = max(DELIMITERS, key=text.count)
     try:
-        names = [
-            name.strip() for name in next(csv.reader([text], delimiter=delimiter), [])
-        ]
+        names = [name.strip() for name in next(csv.reader([text], delimiter=delimiter), [])]
     except csv.Error as error:
         raise InputError(f"{where}: line 1: {error}; expected column names") from None
     if names and all(_is_number(name) for name in names):

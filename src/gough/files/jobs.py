@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.files.block import Block, number_column
+from gough.files.block import Block, label_column, number_column
 from gough.files.identity import check_same, describe
 from gough.files.names import (
     DEVIATIONS,
@@ -74,7 +74,7 @@ def solve_file(
         leg_noise: standard deviation of the readings, in their unit.
         head: how many first rows the report is to hold.
         progress: called after every block, with how far the file is read and the counts.
-        solver: passed on to `gough.solve`: seed, tolerance, max_iterations.
+        solver: passed on to `gough.solve`: seed, tol, max_iterations and the like.
 
     Raises:
         GoughError: what is wrong, where and what to do; `out` is then as it was.
@@ -153,24 +153,18 @@ def solution_columns(
     if angles == "deg":
         turn = np.degrees(turn)
     values = np.concatenate([pose.position, turn], axis=-1)
-    columns = {
-        name: number_column(values[:, i]) for i, name in enumerate(_pose_names(angles))
-    }
+    columns = {name: number_column(values[:, i]) for i, name in enumerate(_pose_names(angles))}
     columns[STATUS] = _labels(SOLVED, solution.status)
     columns["residual"] = number_column(solution.residual)
     columns["iterations"] = number_column(solution.iterations)
     if leg_noise is not None:
         covariance = pose_covariance(platform, pose, leg_noise)
         deviations = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-        columns |= {
-            name: number_column(deviations[:, i]) for i, name in enumerate(DEVIATIONS)
-        }
+        columns |= {name: number_column(deviations[:, i]) for i, name in enumerate(DEVIATIONS)}
     return columns
 
 
-def poses_from_columns(
-    values: Array, names: Sequence[str]
-) -> tuple[Pose, Callable[[int], str]]:
+def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Callable[[int], str]]:
     """Poses, NaN where a row is none, and a function that says what is wrong with row i.
 
     Args:
@@ -196,9 +190,7 @@ def poses_from_columns(
     position, turn = clean[:, :3], clean[:, 3:]
     if rotation == QUATERNION:
         return Pose(position, turn), reason
-    return Pose.from_euler(
-        position, np.radians(turn) if rotation == EULER_DEG else turn
-    ), reason
+    return Pose.from_euler(position, np.radians(turn) if rotation == EULER_DEG else turn), reason
 
 
 def _run(
@@ -273,10 +265,7 @@ def _pose_names(angles: Angles | None) -> tuple[str, ...]:
 
 
 def _labels(outcomes: Sequence[Outcome], status: NDArray[np.uint8]) -> pa.Array:
-    labels = pa.array([outcome.label for outcome in outcomes])
-    return pa.DictionaryArray.from_arrays(
-        number_column(status.astype(np.int32)), labels
-    ).cast(pa.string())
+    return label_column(status, [outcome.label for outcome in outcomes])
 
 
 def _placed(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.uint8]:
@@ -285,12 +274,10 @@ def _placed(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.uint8
     status[~platform.in_workspace(pose)] = OUTSIDE_WORKSPACE
     if platform.stroke is not None:
         low, high = platform.stroke.T
-        slack = 1e-12 * np.maximum(
-            np.abs(low), np.abs(high)
-        )  # limits written with their digits
-        status[
-            np.any((readings < low - slack) | (readings > high + slack), axis=-1)
-        ] = OUTSIDE_STROKE
+        slack = 1e-12 * np.maximum(np.abs(low), np.abs(high))  # limits written with their digits
+        status[np.any((readings < low - slack) | (readings > high + slack), axis=-1)] = (
+            OUTSIDE_STROKE
+        )
     status[~np.all(np.isfinite(readings), axis=-1)] = UNREACHABLE
     status[np.isnan(pose.position[:, 0])] = INVALID
     return status
@@ -305,9 +292,7 @@ def _name(
     """Describe invalid rows, as long as the report has room."""
     for i in np.flatnonzero(invalid)[: NAMED - len(report.invalid)]:
         row = int(i)
-        report.invalid.append(
-            f"{block.place(row)}: {block.bad.get(row) or reason(row)}"
-        )
+        report.invalid.append(f"{block.place(row)}: {block.bad.get(row) or reason(row)}")
 
 
 def _bad_legs(readings: Array) -> str:

@@ -25,9 +25,7 @@ def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     """
     missing = [name for name in LEGS if name not in found]
     if missing:
-        some = (
-            f"no column {', '.join(missing)}" if len(missing) < 6 else "no leg columns"
-        )
+        some = f"no column {', '.join(missing)}" if len(missing) < 6 else "no leg columns"
         raise InputError(
             f"{where}: {some}; expected leg_1 to leg_6, found {_list(found)}; rename the columns"
         )
@@ -43,11 +41,7 @@ def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     missing = [name for name in POSITION if name not in found]
     rotation = next((r for r in ROTATIONS if all(name in found for name in r)), None)
     if missing or rotation is None:
-        what = (
-            f"column {', '.join(missing)}"
-            if missing
-            else "whole set of rotation columns"
-        )
+        what = f"column {', '.join(missing)}" if missing else "whole set of rotation columns"
         raise InputError(
             f"{where}: no {what}; expected x, y, z and one of qw, qx, qy, qz | rx, ry, rz [rad] | "
             f"rx_deg, ry_deg, rz_deg; found {_list(found)}; rename the columns"
@@ -65,13 +59,9 @@ def checked(where: str, found: Sequence[str], wanted: Sequence[str]) -> tuple[st
         if name not in found:
             near = difflib.get_close_matches(name, found, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            raise InputError(
-                f"{where}: no column {name!r}; {hint}It has {_list(found)}"
-            )
+            raise InputError(f"{where}: no column {name!r}; {hint}It has {_list(found)}")
         if list(found).count(name) > 1:
-            raise InputError(
-                f"{where}: two columns are called {name!r}; rename or remove one"
-            )
+            raise InputError(f"{where}: two columns are called {name!r}; rename or remove one")
     return tuple(wanted)
 
 
@@ -89,8 +79,6 @@ def check_kept(keep: Sequence[str], written: Sequence[str]) -> None:
 
 
 def _list(names: Sequence[str]) -> str:
-    shown = [
-        name if name.strip() == name and name else repr(name) for name in names[:12]
-    ]
+    shown = [name if name.strip() == name and name else repr(name) for name in names[:12]]
     more = f", ... ({len(names)} in all)" if len(names) > 12 else ""
     return (", ".join(shown) + more) or "no columns"

@@ -44,9 +44,7 @@ class ParquetSource:
         self._schema = self._file.schema_arrow
         self.columns: list[str] = list(self._schema.names)
         raw = self._file.metadata.metadata or {}
-        self.metadata = {
-            k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()
-        }
+        self.metadata = {k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()}
         self.total: int | None = self._file.metadata.num_rows
         if not self.total:
             raise InputError(f"{where}: holds no rows; expected a row per pose")
@@ -105,9 +103,7 @@ class ParquetSource:
         if any(test(kind) for test in tests):
             return
         first = self._next(self._file.iter_batches(batch_size=1, columns=[name]))
-        found = (
-            f"{first.column(0)[0].as_py()!r:.60}" if first is not None else "nothing"
-        )
+        found = f"{first.column(0)[0].as_py()!r:.60}" if first is not None else "nothing"
         raise InputError(
             f"{self.where}: column {name}: holds {kind}, expected numbers; row 1 has {found}; "
             "convert the column to float64"

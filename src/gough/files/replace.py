@@ -43,16 +43,12 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         _sync_folder(target.parent)
     except BaseException as error:
         if file is not None:
-            with suppress(
-                OSError
-            ):  # closing writes what is buffered, which can fail again
+            with suppress(OSError):  # closing writes what is buffered, which can fail again
                 file.close()
             with suppress(OSError):
                 os.unlink(temporary)
         if isinstance(error, OSError):
-            raise GoughError(
-                f"{path}: {why(error)}; nothing was changed there"
-            ) from None
+            raise GoughError(f"{path}: {why(error)}; nothing was changed there") from None
         raise
 
 
@@ -66,9 +62,7 @@ def check_target(path: str | Path) -> None:
     if target.is_dir():
         raise GoughError(f"{path}: is a folder; name a file in it")
     if target.exists() and not target.is_file():
-        raise GoughError(
-            f"{path}: is a device or a pipe, not a file; use -o - and redirect it"
-        )
+        raise GoughError(f"{path}: is a device or a pipe, not a file; use -o - and redirect it")
     if not target.parent.is_dir():
         raise GoughError(f"{path}: there is no folder {target.parent}; make it first")
 

@@ -65,11 +65,7 @@ class Report:
     @property
     def failures(self) -> int:
         """Rows whose answer cannot be used."""
-        return sum(
-            int(n)
-            for n, o in zip(self.counts, self.outcomes, strict=True)
-            if not o.usable
-        )
+        return sum(int(n) for n, o in zip(self.counts, self.outcomes, strict=True) if not o.usable)
 
     def add(
         self,

@@ -100,9 +100,7 @@ class ParquetSink:
     def close(self) -> None:
         """Let go of the writer; after `finish` this does nothing."""
         if self._writer is not None and self._writer.is_open:
-            with suppress(
-                Exception
-            ):  # it tries to write a footer to a file that may be full
+            with suppress(Exception):  # it tries to write a footer to a file that may be full
                 self._writer.close()
 
     def _flush(self) -> None:
@@ -138,8 +136,7 @@ def _header(names: list[str]) -> bytes:
 
 def _csv_rows(table: pa.Table) -> bytes:
     columns = [
-        c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c
-        for c in table.columns
+        c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c for c in table.columns
     ]
     table = pa.table(columns, names=table.column_names)
     # pyarrow's "needed" quotes all text; try without, which it refuses where quotes are needed
@@ -150,16 +147,10 @@ def _csv_rows(table: pa.Table) -> bytes:
             pacsv.write_csv(table, buffer, options)
         except pa.ArrowInvalid as error:
             if style == "needed":
-                raise GoughError(
-                    f"cannot be written as CSV: {error}; write .parquet"
-                ) from None
+                raise GoughError(f"cannot be written as CSV: {error}; write .parquet") from None
         except pa.ArrowNotImplementedError:
-            kinds = ", ".join(
-                f"{f.name} ({f.type})" for f in table.schema if _nested(f.type)
-            )
-            raise GoughError(
-                f"a kept column cannot be CSV: {kinds}; write .parquet"
-            ) from None
+            kinds = ", ".join(f"{f.name} ({f.type})" for f in table.schema if _nested(f.type))
+            raise GoughError(f"a kept column cannot be CSV: {kinds}; write .parquet") from None
         else:
             return buffer.getvalue().to_pybytes()
     raise AssertionError("one of the two styles returns or raises")
