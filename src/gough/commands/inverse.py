@@ -35,9 +35,11 @@ def run(
 
     gough inverse poses.csv -p rubin_camera -o legs.parquet
 
-    Poses are x, y, z in the platform's unit with a quaternion qw, qx, qy, qz, or with Euler
-    angles rx, ry, rz in rad or rx_deg, ry_deg, rz_deg, where R = Rx Ry Rz. Exit code 0: all rows
-    have legs; 1: some have not; 2: nothing was written, the error says why.
+    Columns of a pose: x, y, z in the platform's unit, and its rotation:
+
+    qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz).
+
+    Exit code 0: all rows have legs; 1: some have not; 2: nothing was written.
 
     Args:
         poses: .csv or .parquet with these columns, or - for CSV on standard input.

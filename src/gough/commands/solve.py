@@ -42,8 +42,9 @@ def run(
 
     gough solve legs.parquet -p rubin_camera -o poses.parquet
 
-    Every row of readings gives a row of output with its status. Exit code 0: all poses are
-    usable; 1: some are not; 2: nothing was written, the error says why.
+    Every row of readings gives a row of output with its status.
+
+    Exit code 0: all poses are usable; 1: some are not; 2: nothing was written.
 
     Args:
         legs: .csv or .parquet with columns leg_1 to leg_6, or - for CSV on standard input.

@@ -53,7 +53,7 @@ def to_float(column: pa.ChunkedArray) -> pa.ChunkedArray:
 def number_array(column: pa.ChunkedArray) -> Array:
     """A float64 column as an array (N,); absent values are NaN."""
     filled = column.fill_null(math.nan) if column.null_count else column
-    return np.concatenate([np.from_dlpack(chunk) for chunk in filled.chunks])
+    return np.concatenate([np.from_dlpack(chunk) for chunk in filled.chunks], dtype=np.float64)
 
 
 def number_column(values: np.ndarray) -> pa.Array:

@@ -117,25 +117,20 @@ class CsvSource:
         """(number of the first line, whole lines) until the end of the file."""
         line, rest = self._first_line, self._rest
         per_row = (rest.find(b"\n") + 1) or len(rest)
-        size = max(rows * per_row, 1 << 12)
-        while True:
-            more = self._read(max(size - len(rest), HEAD)) if len(rest) < size else b""
-            data = rest + more
-            if not data:
-                return
-            # a block ends where a line ends, and no sooner than `size` unless the file does
-            end = _last_line_end(data, size) if more or len(rest) >= size else len(data)
-            if end == 0 and len(data) > max(LONGEST_LINE, 2 * size):
+        size = max(rows * per_row, 1 << 8)
+        while data := rest + (self._read(size - len(rest)) if len(rest) < size else b""):
+            # a block ends where a line ends, or where the file does
+            end = _last_line_end(data, size) if len(data) >= size else len(data)
+            if end:
+                yield line, data[:end]
+                line += data.count(b"\n", 0, end)
+            elif size > LONGEST_LINE:
                 raise InputError(
                     f"{self.where}: line {line}: no end found; put the row's quotation marks in "
                     "order, and end lines with LF or CRLF"
                 )
-            if end == 0:
+            else:
                 size *= 2
-                rest = data
-                continue
-            yield line, data[:end]
-            line += data.count(b"\n", 0, end)
             rest = data[end:]
 
     # ---- kept columns -----------------------------------------------------------------
@@ -202,9 +197,9 @@ def _first_line_end(data: bytes) -> int:
     return end
 
 
-def _last_line_end(data: bytes, least: int) -> int:
-    """Where the last line ends that is not inside quotation marks; 0 for nowhere."""
-    end = data.rfind(b"\n") + 1
+def _last_line_end(data: bytes, limit: int) -> int:
+    """Where the last line ends, up to `limit`, that is not inside quotation marks; 0 for nowhere."""
+    end = data.rfind(b"\n", 0, limit) + 1
     if b'"' not in data:
         return end
     quotes = data.count(b'"', 0, end)
@@ -247,7 +242,9 @@ def _layout(where: str, header: bytes) -> Layout:
         raise InputError(f"{where}: its lines end in CR alone; save it with LF or CRLF line ends")
     delimiter = max(DELIMITERS, key=text.count)
     try:
-        names = [name.strip() for name in next(csv.reader([text], delimiter=delimiter), [])]
+        names = [
+            name.strip() for name in next(csv.reader([text], delimiter=delimiter, strict=True), [])
+        ]
     except csv.Error as error:
         raise InputError(f"{where}: line 1: {error}; expected column names") from None
     if names and all(_is_number(name) for name in names):
