@@ -140,24 +140,19 @@ def _csv_rows(table: pa.Table) -> bytes:
     ]
     table = pa.table(columns, names=table.column_names)
     # pyarrow's "needed" quotes all text; try without, which it refuses where quotes are needed
+    problem = ""
     for style in ("none", "needed"):
         buffer = pa.BufferOutputStream()
         options = pacsv.WriteOptions(include_header=False, quoting_style=style)
         try:
             pacsv.write_csv(table, buffer, options)
-        except pa.ArrowInvalid as error:
-            if style == "needed":
-                raise GoughError(f"cannot be written as CSV: {error}; write .parquet") from None
-        except pa.ArrowNotImplementedError:
-            kinds = ", ".join(f"{f.name} ({f.type})" for f in table.schema if _nested(f.type))
-            raise GoughError(f"a kept column cannot be CSV: {kinds}; write .parquet") from None
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
+            problem = str(error)
         else:
             return buffer.getvalue().to_pybytes()
-    raise AssertionError("one of the two styles returns or raises")
-
-
-def _nested(kind: pa.DataType) -> bool:
-    return pa.types.is_nested(kind) or pa.types.is_binary(kind)
+    nested = [f"column {f.name} ({f.type})" for f in table.schema if pa.types.is_nested(f.type)]
+    what = " and ".join(nested) or problem.splitlines()[0]
+    raise GoughError(f"{what} cannot be written as CSV; leave it out or write .parquet")
 
 
 @contextmanager
