@@ -19,8 +19,10 @@ _HOMES = {
     "PolynomialSeed": "gough.fk.seeds",
     "PoseSeed": "gough.fk.seeds",
     "Seed": "gough.fk.seeds",
+    "Event": "gough.fk.tracker",
     "Solution": "gough.fk.status",
     "Status": "gough.fk.status",
+    "Tracker": "gough.fk.tracker",
     "solve": "gough.fk.solve",
     "assembly_sign": "gough.kinematics",
     "jacobian": "gough.kinematics",
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed
     from gough.fk.solve import solve
     from gough.fk.status import Solution, Status
+    from gough.fk.tracker import Event, Tracker
     from gough.kinematics import (
         assembly_sign,
         jacobian,

@@ -171,6 +171,10 @@ class Pose:
         p = as_batch("points", points, (3,))
         return (self.rotation @ p[..., None])[..., 0] + self.position
 
+    def copy(self) -> Pose:
+        """A pose with arrays of its own."""
+        return Pose.trusted(self.position.copy(), self.wxyz.copy())
+
     def inverse(self) -> Pose:
         """The pose that undoes this one."""
         conj = self.wxyz * np.array([1.0, -1.0, -1.0, -1.0])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.equations import assess, newton_step
+from gough.fk.equations import SMALL, assess, newton_step
 from gough.fk.jit import jit
 from gough.fk.layout import (
-    BEFORE,
     COMPONENTS,
     COUNT,
     INSIDE,
@@ -15,6 +14,7 @@ from gough.fk.layout import (
     OFFSET,
     OPEN,
     ORDER,
+    PER_SIZE,
     REGULAR,
     RESIDUAL,
     ROTARY,
@@ -26,8 +26,6 @@ from gough.fk.layout import (
 from gough.fk.polynomial_kernel import guess_block
 from gough.fk.readings import give_pose, in_stroke, put_pose, take_reading
 from gough.fk.status import Status
-
-SMALL = 1e-14  # squared step after which Newton's error is at rounding
 
 # A row's verdict is its status, or what it still needs.
 DONE = int(Status.CONVERGED)
@@ -94,7 +92,7 @@ def _load(constants, legs, start, last, readings, buffer, valid):
 @jit()
 def _load_lengths(constants, readings, buffer):
     """Lengths of all legs of a block as vector code; whether all of them are above zero."""
-    inverse = 1 / constants[SIZE]
+    inverse = constants[PER_SIZE]
     good = 0
     for i in range(6):
         leg, offset = int(constants[ORDER + i]), constants[OFFSET + i]
@@ -109,40 +107,46 @@ def _load_lengths(constants, readings, buffer):
 
 @jit()
 def _refine(constants, buffer, tolerance, sweeps):
-    """Newton sweeps over the block until every pose has settled or `sweeps` are used up."""
+    """Newton sweeps over the block until every pose has settled or `sweeps` are used up.
+
+    A pose that settled with too large a residual (a step can be small and still lack digits
+    where the system is ill-conditioned) is set going again.
+    """
     for k in range(WIDTH):
         buffer[COUNT * WIDTH + k] = 0.0
-        buffer[BEFORE * WIDTH + k] = np.inf
-    for _ in range(sweeps):
+        buffer[STEP * WIDTH + k] = np.inf
+    for sweep in range(sweeps):
         for k in range(WIDTH):
             newton_step(constants, buffer, k, WIDTH)
-        if _largest_step(buffer) <= SMALL:
+        if _largest_step(buffer) <= SMALL or sweep == sweeps - 1:
             for k in range(WIDTH):
                 assess(constants, buffer, k, WIDTH)
-            if _worst_residual(buffer) <= tolerance:
+            if _wake(buffer, tolerance) == 0:
                 return
-    for k in range(WIDTH):
-        assess(constants, buffer, k, WIDTH)
+    if sweeps == 0:
+        for k in range(WIDTH):
+            assess(constants, buffer, k, WIDTH)
 
 
 @jit()
 def _largest_step(buffer):
-    """Largest squared step of the sweep, infinite for NaN; counts the poses it moved."""
+    """Largest squared step of the sweep, infinite for NaN."""
     largest = 0.0
     for k in range(WIDTH):
         step = buffer[STEP * WIDTH + k]
-        buffer[COUNT * WIDTH + k] += 1.0 if buffer[BEFORE * WIDTH + k] > SMALL else 0.0
-        buffer[BEFORE * WIDTH + k] = step
         largest = max(largest, step if step == step else np.inf)
     return largest
 
 
 @jit()
-def _worst_residual(buffer):
-    worst = 0.0
+def _wake(buffer, tolerance):
+    """Set poses going again whose residual is above the tolerance; how many there are."""
+    count = 0
     for k in range(WIDTH):
-        worst = max(worst, buffer[RESIDUAL * WIDTH + k])
-    return worst
+        above = not buffer[RESIDUAL * WIDTH + k] <= tolerance
+        buffer[STEP * WIDTH + k] = np.inf if above else buffer[STEP * WIDTH + k]
+        count += 1 if above else 0
+    return count
 
 
 @jit()

@@ -29,6 +29,7 @@ from gough.fk.jit import jit
 from gough.fk.layout import (
     BASE,
     CENTRE,
+    COUNT,
     DETERMINANT,
     ENOUGH,
     HOME,
@@ -47,6 +48,8 @@ from gough.fk.layout import (
     STEP,
     TURN,
 )
+
+SMALL = 1e-16  # squared step after which Newton's error is at rounding
 
 inline = jit(cache=False, forceinline=True)  # compiled into its callers, which are cached
 
@@ -199,7 +202,12 @@ def move(buffer, k, stride, v0, v1, v2, w0, w1, w2):
 
 @inline
 def newton_step(constants, buffer, k, stride):
-    """One Newton step of pose k, in place; stores its squared size and the determinant."""
+    """One Newton step of pose k, in place; stores its squared size and the determinant.
+
+    A pose whose last step was SMALL stays where it is, so that a row's answer does not depend
+    on how long its neighbours in the block take.
+    """
+    active = 1.0 if buffer[STEP * stride + k] > SMALL else 0.0
     w, x, y, z = get_quaternion(buffer, k, stride)
     R = rotation(w, x, y, z)
     v0, v1, v2, w0, w1, w2, determinant = eliminate(
@@ -210,7 +218,11 @@ def newton_step(constants, buffer, k, stride):
         equation(constants, buffer, k, stride, R, 4),
         equation(constants, buffer, k, stride, R, 5),
     )
-    move(buffer, k, stride, v0, v1, v2, w0, w1, w2)
+    move(
+        buffer, k, stride,
+        active * v0, active * v1, active * v2, active * w0, active * w1, active * w2,
+    )  # fmt: skip
+    buffer[COUNT * stride + k] += active
     buffer[STEP * stride + k] = v0 * v0 + v1 * v1 + v2 * v2 + w0 * w0 + w1 * w1 + w2 * w2
     buffer[DETERMINANT * stride + k] = determinant
 

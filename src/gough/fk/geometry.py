@@ -38,6 +38,7 @@ def constants(platform: Platform, singular: float = SINGULAR) -> Array:
     put(layout.ORDER, order)
     put(layout.FIXED, (platform.base - base_centre)[order] / size)
     put(layout.SIZE, size)
+    put(layout.PER_SIZE, 1 / size)
     put(layout.PIVOT, (platform.pivot_point - centre) / size)
     put(layout.ORIGIN, base_centre - platform.pivot_point)
     put(layout.REST, platform.home_legs)

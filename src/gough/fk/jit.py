@@ -14,7 +14,8 @@ import numba
 Function = TypeVar("Function", bound=Callable)
 
 # Reordering and fused multiply-add are allowed; assuming that NaN and infinity do not occur
-# is not, since invalid readings must stay visible.
+# is not, since invalid readings must stay visible. Mind that Numba's isfinite(x) is
+# x - x == 0, which these flags fold to True: compare abs(x) < inf instead.
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 

@@ -15,9 +15,8 @@ BASE = 21  # b: 6 x 3
 RESIDUAL = 39  # largest | |d_i| - l_i |
 INSIDE = 40  # 1 in the workspace and on home's side of all singularities, else 0
 REGULAR = 41  # 1 where the distance to singularity is surely above the threshold, else 0
-COUNT = 42  # Newton steps that were needed
-BEFORE = 43  # STEP of the sweep before
-COMPONENTS = 44
+COUNT = 42  # Newton steps taken
+COMPONENTS = 43
 
 WIDTH = 64  # poses in a block: long enough for vector loops, short enough for the cache
 
@@ -44,7 +43,8 @@ ORIGIN = 115  # centre of the base joints minus pivot [platform unit]: 3
 START = 118  # home in internal coordinates: position 3, quaternion 4
 REST = 125  # readings at home, as they come: 6
 STROKE = 131  # lowest and highest reading, as they come: 6 x 2
-CONSTANTS = 143
+PER_SIZE = 143  # 1 / SIZE, made once: compilers may turn x (1 / y) into x / y in one loop only
+CONSTANTS = 144
 
 # Block verdicts from here on are not statuses: the row is still open.
 OPEN = 100

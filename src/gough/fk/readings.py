@@ -14,6 +14,7 @@ from gough.fk.layout import (
     OFFSET,
     ORDER,
     ORIGIN,
+    PER_SIZE,
     PIVOT,
     REST,
     ROD,
@@ -35,11 +36,12 @@ def take_reading(constants, legs, row, buffer, k, stride):
     for i in range(6):
         reading = legs[row, int(constants[ORDER + i])]
         length = reading + constants[OFFSET + i]
-        valid &= np.isfinite(length) & ((length > 0) | (constants[ROTARY] == 1))
+        # by comparison, since Numba's isfinite is x - x == 0, which fast-math folds to True
+        valid &= (np.abs(length) < np.inf) & ((length > 0) | (constants[ROTARY] == 1))
     for i in range(6):
         leg = int(constants[ORDER + i])
         reading = legs[row, leg] if valid else constants[REST + leg]
-        length = (reading + constants[OFFSET + i]) / constants[SIZE]
+        length = (reading + constants[OFFSET + i]) * constants[PER_SIZE]
         cosine, sine = 0.0, 0.0
         if constants[ROTARY] == 1:
             length = constants[ROD]
