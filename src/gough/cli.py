@@ -22,7 +22,9 @@ def main(arguments: list[str] | None = None) -> None:
     """
     given = sys.argv[1:] if arguments is None else arguments
     stopping.listen()
-    sys.exit(_guarded(given))
+    code = _guarded(given)
+    stopping.ignore()
+    sys.exit(code)
 
 
 def _guarded(arguments: list[str]) -> int:
@@ -86,7 +88,7 @@ def _help() -> str:
         [
             "usage: gough COMMAND [OPTIONS]",
             "",
-            "Where a hexapod is: poses of Gough-Stewart platforms from the lengths of their legs.",
+            "Where a hexapod is: its poses from the lengths of its legs, and back.",
             "",
             "commands:",
             *lines,

@@ -85,7 +85,8 @@ def print_invalid(report: Report, where: str) -> None:
         if outcome.label == "invalid_input"
     )
     if invalid > len(report.invalid):
-        screen.print(f"{where}: and {invalid - len(report.invalid):,} more invalid rows")
+        more = f"{where}: and {invalid - len(report.invalid):,} more invalid rows"
+        screen.print(more, markup=False, soft_wrap=True)
 
 
 def print_poses(report: Report, platform: Platform, screen: Console) -> None:

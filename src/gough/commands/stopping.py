@@ -34,6 +34,14 @@ def listen() -> None:
             signal.signal(number, _note)
 
 
+def ignore() -> None:
+    """The work is over, one way or the other: let nothing change the exit code any more."""
+    for name in SIGNALS:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == _note:
+            signal.signal(number, signal.SIG_IGN)
+
+
 def asked() -> int | None:
     """The signal that asked for the end, if one did."""
     return _asked
