@@ -31,9 +31,8 @@ def gough(capsys: pytest.CaptureFixture[str], monkeypatch) -> Callable[..., Resu
     def run(*arguments: object) -> Result:
         with pytest.raises(SystemExit) as end:
             cli.main([str(a) for a in arguments])
-        return Result(
-            end.value.code if isinstance(end.value.code, int) else 0, *capsys.readouterr()
-        )
+        out, err = capsys.readouterr()
+        return Result(int(end.value.code or 0), str(out), str(err))
 
     return run
 

@@ -51,7 +51,7 @@ def test_a_file_too_large_is_one_line_and_the_old_file_stays(many, tmp_path, end
     assert unfinished(tmp_path) == []
 
 
-def poses(path: Path) -> tuple[object, ...]:
+def poses(path: Path) -> tuple[Path, str, str]:
     """`path` as poses: any six columns of numbers will do to fill a disk."""
     text = path.read_text()
     header, rest = text.split("\n", 1)
