@@ -24,7 +24,7 @@ from gough.fk.layout import (
     WIDTH,
 )
 from gough.fk.polynomial_kernel import guess_block
-from gough.fk.readings import give_pose, in_stroke, put_pose, take_reading
+from gough.fk.readings import give_pose, in_stroke, place, put_pose, take_reading
 from gough.fk.status import Status
 
 # A row's verdict is its status, or what it still needs.
@@ -81,12 +81,24 @@ def _load(constants, legs, start, last, readings, buffer, valid):
         row = min(start + k, last - 1)
         for leg in range(6):
             readings[leg * WIDTH + k] = legs[row, leg]
-    if constants[ROTARY] == 1 or not _load_lengths(constants, readings, buffer):
-        for k in range(WIDTH):
+    rotary = constants[ROTARY] == 1
+    if not rotary and _load_lengths(constants, readings, buffer):
+        valid[:] = True
+        return
+    for k in range(WIDTH):
+        valid[k] = not rotary and _has_lengths(buffer, k)
+        if not valid[k]:  # rows beside a bad one keep what they have, to the last bit
             row = min(start + k, last - 1)
             valid[k] = take_reading(constants, legs, row, buffer, k, WIDTH)
-    else:
-        valid[:] = True
+
+
+@jit()
+def _has_lengths(buffer, k):
+    good = True
+    for i in range(6):
+        length = buffer[(LENGTH + i) * WIDTH + k]
+        good &= (length > 0) & (length < np.inf)
+    return good
 
 
 @jit()
@@ -153,9 +165,11 @@ def _wake(buffer, tolerance):
 def _store(constants, buffer, legs, valid, start, last, tolerance, out):
     position, wxyz, residuals, iterations, verdicts = out
     troubled = 0
+    for k in range(WIDTH):  # all of them: a shorter loop would round its last poses differently
+        place(constants, buffer, k, WIDTH)
     for k in range(min(WIDTH, last - start)):
         row = start + k
-        give_pose(constants, buffer, k, WIDTH, position, wxyz, row)
+        give_pose(buffer, k, WIDTH, position, wxyz, row)
         residuals[row] = buffer[RESIDUAL * WIDTH + k] * constants[SIZE]
         iterations[row] = int(buffer[COUNT * WIDTH + k])
         stroke = in_stroke(constants, legs, row)

@@ -48,7 +48,7 @@ def descend(constants, buffer, work, tolerance, limit):
                 return _end(r, tolerance, STATIONARY), count, np.sqrt(cost)
         _limit(step, constants[RADIUS])
         before = _pose(buffer)
-        move(buffer, 0, 1, -step[0], -step[1], -step[2], -step[3], -step[4], -step[5])
+        move(buffer, 0, 1, True, -step[0], -step[1], -step[2], -step[3], -step[4], -step[5])
         trial = strut_errors(constants, buffer, trial_J, trial_r)
         if trial < cost:
             J[:], r[:], cost = trial_J, trial_r, trial

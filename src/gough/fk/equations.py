@@ -184,20 +184,22 @@ def get_quaternion(buffer, k, stride):
 
 
 @inline
-def move(buffer, k, stride, v0, v1, v2, w0, w1, w2):
-    """Step pose k by translation v and rotation w (in base coordinates)."""
-    buffer[k] += v0
-    buffer[stride + k] += v1
-    buffer[2 * stride + k] += v2
+def move(buffer, k, stride, active, v0, v1, v2, w0, w1, w2):
+    """Step pose k by translation v and rotation w (in base coordinates), if `active`."""
     w, x, y, z = get_quaternion(buffer, k, stride)
     a, b, c = 0.5 * w0, 0.5 * w1, 0.5 * w2
-    put_quaternion(
-        buffer, k, stride,
-        w - a * x - b * y - c * z,
-        x + a * w + b * z - c * y,
-        y + b * w + c * x - a * z,
-        z + c * w + a * y - b * x,
-    )  # fmt: skip
+    # selected, not multiplied by zero: even normalising again would change a last digit
+    buffer[k] = buffer[k] + v0 if active else buffer[k]
+    buffer[stride + k] = buffer[stride + k] + v1 if active else buffer[stride + k]
+    buffer[2 * stride + k] = buffer[2 * stride + k] + v2 if active else buffer[2 * stride + k]
+    new_w, new_x = w - a * x - b * y - c * z, x + a * w + b * z - c * y
+    new_y, new_z = y + b * w + c * x - a * z, z + c * w + a * y - b * x
+    inverse = 1 / np.sqrt(new_w * new_w + new_x * new_x + new_y * new_y + new_z * new_z)
+    at = QUATERNION * stride + k
+    buffer[at] = new_w * inverse if active else w
+    buffer[at + stride] = new_x * inverse if active else x
+    buffer[at + 2 * stride] = new_y * inverse if active else y
+    buffer[at + 3 * stride] = new_z * inverse if active else z
 
 
 @inline
@@ -207,7 +209,7 @@ def newton_step(constants, buffer, k, stride):
     A pose whose last step was SMALL stays where it is, so that a row's answer does not depend
     on how long its neighbours in the block take.
     """
-    active = 1.0 if buffer[STEP * stride + k] > SMALL else 0.0
+    active = buffer[STEP * stride + k] > SMALL
     w, x, y, z = get_quaternion(buffer, k, stride)
     R = rotation(w, x, y, z)
     v0, v1, v2, w0, w1, w2, determinant = eliminate(
@@ -218,11 +220,8 @@ def newton_step(constants, buffer, k, stride):
         equation(constants, buffer, k, stride, R, 4),
         equation(constants, buffer, k, stride, R, 5),
     )
-    move(
-        buffer, k, stride,
-        active * v0, active * v1, active * v2, active * w0, active * w1, active * w2,
-    )  # fmt: skip
-    buffer[COUNT * stride + k] += active
+    move(buffer, k, stride, active, v0, v1, v2, w0, w1, w2)
+    buffer[COUNT * stride + k] += 1.0 if active else 0.0
     buffer[STEP * stride + k] = v0 * v0 + v1 * v1 + v2 * v2 + w0 * w0 + w1 * w1 + w2 * w2
     buffer[DETERMINANT * stride + k] = determinant
 

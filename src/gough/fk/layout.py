@@ -16,7 +16,8 @@ RESIDUAL = 39  # largest | |d_i| - l_i |
 INSIDE = 40  # 1 in the workspace and on home's side of all singularities, else 0
 REGULAR = 41  # 1 where the distance to singularity is surely above the threshold, else 0
 COUNT = 42  # Newton steps taken
-COMPONENTS = 43
+PLACE = 43  # position as the user sees it [platform unit]: 3
+COMPONENTS = 46
 
 WIDTH = 64  # poses in a block: long enough for vector loops, short enough for the cache
 

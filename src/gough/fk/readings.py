@@ -16,6 +16,7 @@ from gough.fk.layout import (
     ORIGIN,
     PER_SIZE,
     PIVOT,
+    PLACE,
     REST,
     ROD,
     ROTARY,
@@ -76,14 +77,23 @@ def put_pose(buffer, k, stride, poses, row):
 
 
 @inline
-def give_pose(constants, buffer, k, stride, position, wxyz, row):
-    """Pose k into row `row` of position (N, 3) [platform unit] and wxyz (N, 4)."""
+def place(constants, buffer, k, stride):
+    """Pose k's position as the user sees it: of the pivot, in base coordinates."""
     w, x, y, z = get_quaternion(buffer, k, stride)
     lever = turned(
         rotation(w, x, y, z), constants[PIVOT], constants[PIVOT + 1], constants[PIVOT + 2]
     )
-    size = constants[SIZE]
-    position[row, 0] = size * (buffer[k] + lever[0]) + constants[ORIGIN]
-    position[row, 1] = size * (buffer[stride + k] + lever[1]) + constants[ORIGIN + 1]
-    position[row, 2] = size * (buffer[2 * stride + k] + lever[2]) + constants[ORIGIN + 2]
-    wxyz[row, 0], wxyz[row, 1], wxyz[row, 2], wxyz[row, 3] = w, x, y, z
+    size, at = constants[SIZE], PLACE * stride + k
+    buffer[at] = size * (buffer[k] + lever[0]) + constants[ORIGIN]
+    buffer[at + stride] = size * (buffer[stride + k] + lever[1]) + constants[ORIGIN + 1]
+    buffer[at + 2 * stride] = size * (buffer[2 * stride + k] + lever[2]) + constants[ORIGIN + 2]
+
+
+@inline
+def give_pose(buffer, k, stride, position, wxyz, row):
+    """Pose k, once placed, into row `row` of position (N, 3) [platform unit] and wxyz (N, 4)."""
+    at = PLACE * stride + k
+    position[row, 0] = buffer[at]
+    position[row, 1] = buffer[at + stride]
+    position[row, 2] = buffer[at + 2 * stride]
+    wxyz[row, 0], wxyz[row, 1], wxyz[row, 2], wxyz[row, 3] = get_quaternion(buffer, k, stride)

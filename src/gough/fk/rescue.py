@@ -20,7 +20,7 @@ from gough.fk.layout import (
     SIZE,
 )
 from gough.fk.linear import pivoted_solve, smallest_singular_value
-from gough.fk.readings import give_pose, in_stroke, put_pose, take_reading
+from gough.fk.readings import give_pose, in_stroke, place, put_pose, take_reading
 from gough.fk.status import Status
 
 CONVERGED, OUTSIDE_STROKE = int(Status.CONVERGED), int(Status.OUTSIDE_STROKE)
@@ -58,7 +58,8 @@ def rescue_rows(constants, legs, rows, guess, starts, tolerance, limit, singular
         )
         stroke = in_stroke(constants, legs, row)
         statuses[row] = judge(buffer, outcome, stroke, singular, work)
-        give_pose(constants, buffer, 0, 1, position, wxyz, row)
+        place(constants, buffer, 0, 1)
+        give_pose(buffer, 0, 1, position, wxyz, row)
         residuals[row] = buffer[RESIDUAL] * constants[SIZE]
         iterations[row] += count
     return len(rows)
@@ -88,7 +89,7 @@ def solve_row(constants, buffer, guess, n, starts, tolerance, limit, work, best)
             chosen, least = outcome, error
             best[:] = buffer
     buffer[:] = best
-    if chosen == UNFINISHED:  # is there a pose, or is this the nearest miss? Look longer, once
+    if chosen == UNFINISHED and tries > 1:  # is there a pose, or is this the nearest miss? Look longer, once
         chosen, count, _ = descend(constants, buffer, work, tolerance, PATIENCE * limit)
         total += count
         _measure(constants, buffer, work)

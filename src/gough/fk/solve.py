@@ -41,7 +41,8 @@ def solve(
         tol: largest strut length error of a converged row, as a share of the platform's size
             (rounding alone leaves about 2e-15).
         max_iterations: Newton steps from each start; 0 returns the guess itself.
-        restarts: other starts to try before a row is given up.
+        restarts: other starts to try before a row is given up; unless 0, the best of them is
+            followed for longer in the end, to tell a miss from a slow approach.
         singular: distance to singularity (see `singularity_distance`) below which a row is
             reported as near one.
         leg_noise: standard deviation of the readings, a number or (6,), or their covariance

@@ -10,7 +10,7 @@ from gough.fk.equations import SMALL, assess, newton_step
 from gough.fk.jit import jit
 from gough.fk.layout import DETERMINANT, OPEN, QUATERNION, STEP
 from gough.fk.linear import smallest_singular_value
-from gough.fk.readings import give_pose, in_stroke, put_pose, take_reading
+from gough.fk.readings import give_pose, in_stroke, place, put_pose, take_reading
 from gough.fk.status import Status
 
 # What a cycle may say besides a status: the pose is as it was before.
@@ -84,4 +84,5 @@ def keep(constants, buffer, state, position, wxyz):
     for i in range(7):
         state[0, i] = buffer[i]
     state[0, 7] = 1.0 if buffer[DETERMINANT] > 0 else -1.0
-    give_pose(constants, buffer, 0, 1, position, wxyz, 0)
+    place(constants, buffer, 0, 1)
+    give_pose(buffer, 0, 1, position, wxyz, 0)
