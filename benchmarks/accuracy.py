@@ -1,6 +1,6 @@
 """How often the solver is right: every catalog machine, and wide workspaces. Fixed seeds.
 
-    python benchmarks/accuracy.py           # about a minute
+python benchmarks/accuracy.py           # about a minute
 """
 
 from __future__ import annotations
