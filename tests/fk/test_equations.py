@@ -15,9 +15,7 @@ CATALOG = gough.Platform.catalog()
 
 @jit(cache=False)
 def _eliminate(A, b):
-    rows = [
-        (A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5], b[i]) for i in range(6)
-    ]
+    rows = [(A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5], b[i]) for i in range(6)]
     return eliminate(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
 
 
@@ -86,9 +84,10 @@ def test_newton_step_is_newtons(name):
     _newton_step(constants, buffer)
     expected = geometry.to_internal(constants, true)
     np.testing.assert_allclose(buffer[:7], expected, atol=2e-6)
-    assert np.abs(buffer[:7] - expected).max() < 0.02 * np.abs(
-        geometry.to_internal(constants, near) - expected
-    ).max()
+    assert (
+        np.abs(buffer[:7] - expected).max()
+        < 0.02 * np.abs(geometry.to_internal(constants, near) - expected).max()
+    )
 
 
 def test_a_settled_pose_stays_where_it_is():

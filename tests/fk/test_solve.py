@@ -321,7 +321,9 @@ def test_near_singularity_is_what_the_measure_says():
     near = gough.singularity_distance(platform, solution.pose) < threshold
     judged = np.isin(solution.status, [Status.CONVERGED, Status.NEAR_SINGULARITY])
     assert np.sum(near & judged) > 10
-    np.testing.assert_array_equal((solution.status == Status.NEAR_SINGULARITY)[judged], near[judged])
+    np.testing.assert_array_equal(
+        (solution.status == Status.NEAR_SINGULARITY)[judged], near[judged]
+    )
 
 
 def test_wide_workspace_mostly_true():
@@ -418,7 +420,9 @@ def test_wrong_options(options, text):
         gough.solve(platform, platform.home_legs, **options)
 
 
-@pytest.mark.parametrize("legs", [np.zeros(5), np.zeros((6, 5)), 3.0, "abc", [[1, 2, 3, 4, 5, "x"]]])
+@pytest.mark.parametrize(
+    "legs", [np.zeros(5), np.zeros((6, 5)), 3.0, "abc", [[1, 2, 3, 4, 5, "x"]]]
+)
 def test_wrong_legs(legs):
     with pytest.raises(gough.GoughError, match="legs"):
         gough.solve(gough.Platform.load("reference"), legs)
@@ -439,7 +443,9 @@ def test_covariance_is_the_functions():
     expected = gough.pose_covariance(platform, solution.pose, 1e-6)
     np.testing.assert_array_equal(solution.covariance, expected)
     assert solution.covariance is not None
-    np.testing.assert_array_equal(np.isnan(solution.covariance).any(axis=(1, 2)), np.arange(10) == 3)
+    np.testing.assert_array_equal(
+        np.isnan(solution.covariance).any(axis=(1, 2)), np.arange(10) == 3
+    )
 
 
 def test_solutions_can_be_read():

@@ -56,7 +56,7 @@ class Settings:
 
     tol: float = 1e-12
     max_iterations: int = 60
-    restarts: int = 8
+    restarts: int = 24
     singular: float = geometry.SINGULAR
     workers: int | None = None
 

@@ -38,7 +38,8 @@ def remember(platform: Platform, degree: int, make: Callable[[], Polynomial]) ->
 def _read(path: Path, degree: int) -> Polynomial | None:
     """The polynomial in a file; None where there is none, or it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        # opened here, since np.load leaves a damaged file open
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             found = Polynomial(file["coefficients"], file["scaling"], file["anchor"], degree)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

@@ -37,10 +37,10 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
         except RuntimeError as error:
             if "no locator" not in str(error):
                 raise
-            return numba.njit(**settings, **options)(function)
+            return numba.njit(**settings, **options)(function)  # pyright: ignore
         if cache:
             _depend_on_whole_package(compiled, Path(inspect.getfile(function)).parent)
-        return compiled
+        return compiled  # pyright: ignore[reportReturnType]
 
     return decorate
 

@@ -119,7 +119,7 @@ def _least_squares(u: Array, wanted: Array, degree: int) -> Array:
     """
     parts = [slice(i, i + CHUNK) for i in range(0, len(u), CHUNK)]
     terms = [_terms(u[part], degree) for part in parts]
-    gram = sum(t.T @ t for t in terms)
+    gram = np.sum([t.T @ t for t in terms], axis=0)
     used = np.flatnonzero(np.diagonal(gram) > 0)
     gram = gram[np.ix_(used, used)]
     gram[np.diag_indices_from(gram)] *= 1 + 1e-14

@@ -28,6 +28,7 @@ NEAR_SINGULARITY, OUTSIDE_WORKSPACE = int(Status.NEAR_SINGULARITY), int(Status.O
 UNREACHABLE, NOT_CONVERGED = int(Status.UNREACHABLE), int(Status.NOT_CONVERGED)
 INVALID_INPUT = int(Status.INVALID_INPUT)
 
+OTHER_MODE = 8  # starts after which a pose outside the workspace is taken for the answer
 PATIENCE = 6  # times the limit, for the last look at a row that no start settled
 
 
@@ -85,11 +86,13 @@ def solve_row(constants, buffer, guess, n, starts, tolerance, limit, work, best)
         _measure(constants, buffer, work)
         if outcome == SOLVED and buffer[INSIDE] == 1.0:
             return outcome, total
+        if chosen == SOLVED and attempt >= OTHER_MODE:
+            break
         if _better(outcome, error, chosen, least):
             chosen, least = outcome, error
             best[:] = buffer
     buffer[:] = best
-    if chosen == UNFINISHED and tries > 1:  # is there a pose, or is this the nearest miss? Look longer, once
+    if chosen == UNFINISHED and tries > 1:  # a pose, or a miss? A longer look, once
         chosen, count, _ = descend(constants, buffer, work, tolerance, PATIENCE * limit)
         total += count
         _measure(constants, buffer, work)

@@ -22,7 +22,7 @@ def solve(
     seed: str | Seed | Pose = "auto",
     tol: float = 1e-12,
     max_iterations: int = 60,
-    restarts: int = 8,
+    restarts: int = 24,
     singular: float = geometry.SINGULAR,
     leg_noise: ArrayLike | None = None,
     workers: int | None = None,

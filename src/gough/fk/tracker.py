@@ -184,10 +184,10 @@ class Tracker:
         found = solve(
             self.platform, self._legs[0], tol=self._limits[0], singular=self._limits[1], workers=1
         )
-        if found.status in (Status.UNREACHABLE, Status.NOT_CONVERGED):
-            self._code, self.event = int(found.status), Event.HELD
-            return
         self._code = int(found.status)
+        if self._code > Status.OUTSIDE_WORKSPACE:
+            self.event = Event.HELD
+            return
         self._agreeing = self._agreeing + 1 if self._agrees(found.pose) else 1
         self._candidate = found.pose
         if self._lost or self._agreeing >= self._confirm:
