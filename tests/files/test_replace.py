@@ -38,7 +38,7 @@ def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path):
 def test_after_any_exception_the_old_file_is_untouched(tmp_path, error):
     path = tmp_path / "poses.csv"
     path.write_text("old")
-    with pytest.raises(error), replacing(path) as file:
+    with pytest.raises(error), replacing(path) as file:  # noqa: PT012
         file.write(b"new")
         raise error
     assert path.read_text() == "old"
