@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ def bulk_table(machine: gough.Platform, pose: gough.Pose, legs: np.ndarray) -> f
     answer = 0.0
     for seed in ("home", "polynomial-2", "polynomial", "polynomial-5"):
         one, all_cores = (
-            best(lambda n=n: gough.solve(machine, legs, seed=seed, workers=n)) for n in (1, cores())
+            best(partial(gough.solve, machine, legs, seed=seed, workers=n)) for n in (1, cores())
         )
         solution = gough.solve(machine, legs, seed=seed)
         true = solution.pose.distance(pose)[0] < 1e-9 * machine.size

@@ -6,6 +6,7 @@ from scipy.optimize import root
 
 import gough
 from gough import Status
+from gough.kinematics import equivalent_struts
 
 
 @pytest.mark.parametrize("name", gough.Platform.catalog())
@@ -14,7 +15,7 @@ def test_scipy_root_finds_the_same_poses(name):
     legs = gough.leg_lengths(platform, platform.sample_poses(10, seed=13))
     solution = gough.solve(platform, legs)
     size = np.r_[np.full(3, platform.size), np.ones(3)]
-    base, lengths = gough.kinematics.equivalent_struts(platform, legs)
+    base, lengths = equivalent_struts(platform, legs)
 
     def errors(x, i):
         turn = gough.Pose.from_rotation_vector(np.zeros(3), x[3:])

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import gough
 from gough import Status
+from gough.kinematics import equivalent_struts
 
 CATALOG = gough.Platform.catalog()
 BATCHES = [(), (1,), (3, 1, 2, 1), (0,)]
@@ -48,7 +49,7 @@ def test_every_seed_ends_at_the_true_pose(seed):
 
 def test_motor_angles_to_head_pose_and_back():
     platform = gough.Platform.load("reachy_mini")
-    pose, angles = _legs(platform, 1_000)
+    _, angles = _legs(platform, 1_000)
     back = gough.leg_lengths(platform, gough.solve(platform, angles).pose)
     np.testing.assert_allclose(back, angles, atol=1e-12)
 
@@ -77,7 +78,8 @@ def test_batch_axes_are_kept(batch):
     solution = gough.solve(platform, legs, leg_noise=1e-4)
     assert solution.pose.position.shape == (*batch, 3)
     assert solution.pose.wxyz.shape == (*batch, 4)
-    assert solution.status.shape == solution.residual.shape == solution.iterations.shape == batch
+    assert np.shape(solution.status) == batch
+    assert solution.residual.shape == solution.iterations.shape == batch
     assert solution.covariance is not None
     assert solution.covariance.shape == (*batch, 6, 6)
     if count:
@@ -123,10 +125,6 @@ def test_the_readings_are_not_written_to():
 def test_number_types(dtype):
     platform = gough.Platform.load("reference")
     legs = np.full((2, 6), 655).astype(dtype)
-    if dtype is object:
-        with pytest.raises(gough.GoughError, match="legs"):
-            gough.solve(platform, legs)
-        return
     assert np.all(gough.solve(platform, legs).status == Status.CONVERGED)
 
 
@@ -156,7 +154,7 @@ def test_scale_changes_nothing(seed, scale):
     a, b = gough.solve(one, legs), gough.solve(other, legs * scale)
     np.testing.assert_array_equal(a.status, b.status)
     good = a.status == Status.CONVERGED
-    sensitive = 1 / gough.singularity_distance(one, one.home)
+    sensitive = 1 / float(gough.singularity_distance(one, one.home))
     np.testing.assert_allclose(
         b.pose.position[good] / scale, a.pose.position[good], atol=1e-11 * sensitive
     )
@@ -174,7 +172,7 @@ def test_legs_in_another_order_change_nothing(seed):
     a, b = gough.solve(one, legs), gough.solve(other, legs[:, order])
     good = (a.status == Status.CONVERGED) & (b.status == Status.CONVERGED)
     np.testing.assert_array_equal(a.status, b.status)
-    sensitive = 1 / gough.singularity_distance(one, one.home)
+    sensitive = 1 / float(gough.singularity_distance(one, one.home))
     assert np.all(a.pose.distance(b.pose)[0][good] <= 1e-11 * sensitive)
 
 
@@ -190,7 +188,7 @@ def test_moving_the_base_moves_the_poses(seed):
     a, b = gough.solve(one, legs, seed="home"), gough.solve(other, legs, seed="home")
     good = (a.status == Status.CONVERGED) & (b.status == Status.CONVERGED)
     assert np.mean(good) > 0.5
-    sensitive = 1 / gough.singularity_distance(one, one.home)
+    sensitive = 1 / float(gough.singularity_distance(one, one.home))
     assert np.all((shift @ a.pose).distance(b.pose)[0][good] <= 1e-10 * sensitive)
 
 
@@ -242,7 +240,7 @@ def test_nothing_converged_is_wrong_whatever_comes_in(rows, name):
     solved = np.isin(solution.status, [*gough.Status][:4])
     assert np.all(np.isfinite(solution.pose.position[solved]))
     assert np.all(solution.residual[solved] <= 1e-12 * platform.size)
-    base, lengths = gough.kinematics.equivalent_struts(platform, legs[solved])
+    base, lengths = equivalent_struts(platform, legs[solved])
     joints = gough.joint_positions(platform, solution.pose[solved])
     real = np.linalg.norm(joints - base, axis=-1)
     assert np.all(np.abs(real - lengths) <= 4e-12 * platform.size)
@@ -256,7 +254,7 @@ def test_unreachable_says_by_how_much():
     from scipy.optimize import least_squares
 
     platform = gough.Platform.load("matlab_stewart")
-    legs = platform.home_legs + [0, 0, 0, 0, 0, 2.5]
+    legs = platform.home_legs + np.array([0, 0, 0, 0, 0, 2.5])
     solution = gough.solve(platform, legs)
     assert solution.status == Status.UNREACHABLE
 
@@ -315,7 +313,7 @@ def test_near_a_singularity():
 
 def test_near_singularity_is_what_the_measure_says():
     platform = gough.Platform.load("reference").with_workspace(120, 33)
-    pose, legs = _legs(platform, 5_000)
+    _, legs = _legs(platform, 5_000)
     threshold = 0.05
     solution = gough.solve(platform, legs, singular=threshold)
     near = gough.singularity_distance(platform, solution.pose) < threshold

@@ -118,7 +118,7 @@ def _solution(
     pose = Pose.trusted(rows.position.reshape(*batch, 3), rows.wxyz.reshape(*batch, 4))
     return Solution(
         pose,
-        rows.status.reshape(batch),
+        rows.status.reshape(batch) if batch else Status(int(rows.status[0])),
         rows.residual.reshape(batch),
         rows.iterations.reshape(batch),
         None if leg_noise is None else pose_covariance(platform, pose, leg_noise),

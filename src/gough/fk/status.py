@@ -77,7 +77,7 @@ class Solution:
 
     Attributes:
         pose: batch axes (...) as the legs had; NaN where the input was invalid.
-        status: (...) uint8, to be compared with `Status` members.
+        status: (...) uint8, to be compared with `Status` members; a `Status` for a single row.
         residual: (...) largest difference between a strut's length at the pose and the length
             that its reading asks for [platform unit]; NaN where the input was invalid.
         iterations: (...) int32, Newton steps taken, over all starts that were tried.
@@ -85,7 +85,7 @@ class Solution:
     """
 
     pose: Pose
-    status: NDArray[np.uint8]
+    status: Any  # NDArray[np.uint8] | Status: the union would make every use of it a cast
     residual: Array
     iterations: NDArray[np.int32]
     covariance: Array | None = None
@@ -101,6 +101,8 @@ class Solution:
         return {s: int(numbers[s]) for s in Status if numbers[s]}
 
     def __getitem__(self, index: Any) -> Solution:
+        if isinstance(self.status, Status):
+            raise IndexError("the solution of a single row has no rows")
         covariance = None if self.covariance is None else self.covariance[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
