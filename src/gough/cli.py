@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import suppress
 from importlib import import_module
 
 import gough
@@ -100,10 +101,8 @@ def _help() -> str:
 
 def _complain(text: str) -> int:
     """One line on stderr, which may be gone too."""
-    try:
+    with suppress(OSError):
         print(text, file=sys.stderr, flush=True)
-    except OSError:
-        pass
     return BAD_USAGE
 
 

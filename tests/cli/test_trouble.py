@@ -18,11 +18,13 @@ SLOW = ("--block-rows", 200)  # many blocks: time to interrupt
 
 
 def start(*arguments: object, **options) -> subprocess.Popen:
-    # a shell may have started the tests with SIGINT ignored, which children would inherit
-    restore = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)
+    def restore() -> None:
+        # a shell may have started the tests with SIGINT ignored, which children would inherit
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
     return subprocess.Popen(
         command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env=environment(), preexec_fn=restore, **options,  # noqa: PLW1509
+        env=environment(), preexec_fn=restore, **options,
     )  # fmt: skip
 
 
@@ -40,7 +42,10 @@ def wait_for_unfinished(folder: Path, running: subprocess.Popen) -> None:
 def test_a_file_too_large_is_one_line_and_the_old_file_stays(many, tmp_path, ending):
     out = tmp_path / f"poses{ending}"
     out.write_text("old")
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+
     result = process("inverse", *poses(many), "-o", out, preexec_fn=limit)
     assert result.code == 2
     assert result.err == (
@@ -83,11 +88,13 @@ def test_a_full_disk_behind_standard_output(arguments):
 
 def test_a_reader_that_leaves_is_met_with_silence(many):
     running = start("inverse", *poses(many), "-o", "-", *SLOW)
-    assert running.stdout is not None and running.stderr is not None
+    assert running.stdout is not None
+    assert running.stderr is not None
     assert running.stdout.readline() == "leg_1,leg_2,leg_3,leg_4,leg_5,leg_6,status\n"
     running.stdout.close()
     assert running.wait(60) == 141
     assert running.stderr.read() == ""
+    running.stderr.close()
 
 
 @pytest.mark.parametrize(
@@ -153,9 +160,12 @@ def test_kill_leaves_the_old_file(many, tmp_path):
 
 def test_an_ignored_ctrl_c_stays_ignored(many, tmp_path):
     """nohup and background jobs of a shell."""
-    ignore = lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def ignore() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
     running = subprocess.Popen(
-        command("inverse", *poses(many), "-o", tmp_path / "p.csv"), preexec_fn=ignore,  # noqa: PLW1509
+        command("inverse", *poses(many), "-o", tmp_path / "p.csv"), preexec_fn=ignore,
         stdout=subprocess.DEVNULL,
     )  # fmt: skip
     wait_for_unfinished(tmp_path, running)

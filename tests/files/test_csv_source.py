@@ -138,7 +138,7 @@ def test_files_that_are_not_csv_say_what_they_are(data, words):
 
 def test_a_quote_that_never_ends_is_named(readings):
     data = csv_text(readings).replace(b"\n20.0,", b'\n"20.0,')
-    with pytest.raises(InputError, match="line 42: .*quotation marks"):
+    with pytest.raises(InputError, match=r"line 42: .*quotation marks"):
         read(data)
 
 
@@ -153,7 +153,9 @@ def test_kept_columns_stay_text_unless_types_are_asked_for():
     data = b"a,b,c,d," + HEADER + b"007,7,1.50,,0,1,2,3,4,5,6\n008,8,x,,1,1,2,3,4,5,6\n"
     keep = ("a", "b", "c", "d", "time")
     text = read(data, keep=keep)[0].table
-    assert text.select(keep).to_pylist()[0] == dict(zip(keep, ["007", "7", "1.50", "", "0"]))
+    assert text.select(keep).to_pylist()[0] == dict(
+        zip(keep, ["007", "7", "1.50", "", "0"], strict=True)
+    )
     typed = read(data, keep=keep, typed=True)[0].table
     expected = [pa.string(), pa.int64(), pa.string(), pa.string(), pa.int64()]
     assert typed.select(keep).schema.types == expected

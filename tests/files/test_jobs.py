@@ -135,7 +135,7 @@ def test_kept_columns_pass_unchanged(tmp_path, platform, readings):
     for name in [*kept, "leg_1"]:
         assert found[name].to_pylist() == table(path)[name].to_pylist()
         assert found[name].type == table(path)[name].type
-    with pytest.raises(GoughError, match="column list .*write .parquet"):
+    with pytest.raises(GoughError, match=r"column list .*write \.parquet"):
         solve_file(path, tmp_path / "poses.csv", platform, reading=Reading(keep=("list",)))
     solve_file(path, tmp_path / "p.csv", platform, reading=Reading(keep=("text", "kind")))
     assert table(tmp_path / "p.csv")["kind"].to_pylist() == ["u", "v"] * 100
@@ -243,7 +243,7 @@ def test_random_damage_is_an_error_of_ours_or_none(request, tmp_path, platform, 
     poses = tmp_path / f"poses{path.suffix}"
     solve_file(path, poses, platform)
     whole = poses.read_bytes()
-    dice = random.Random(5)
+    dice, refusals = random.Random(5), []
     for _ in range(150):
         data = bytearray(whole)
         for _ in range(dice.randint(1, 4)):
@@ -259,5 +259,7 @@ def test_random_damage_is_an_error_of_ours_or_none(request, tmp_path, platform, 
         try:
             inverse_file(poses, out, platform)
         except GoughError as error:
+            refusals.append(str(error))
             assert out.read_text() == "old"
-            assert "\n" not in str(error)
+    assert refusals
+    assert not any("\n" in text for text in refusals)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from gough.errors import InputError
+from gough.files.block import Block
 from gough.files.names import LEGS
 from gough.files.source import open_source
 
@@ -17,8 +19,12 @@ from .conftest import parquet_table
 
 
 def numbers(path: Path, rows: int = 50) -> np.ndarray:
-    blocks = list(open_source(path).blocks(LEGS, rows=rows))
-    return np.concatenate([block.numbers(LEGS) for block in blocks])
+    return np.concatenate([block.numbers(LEGS) for block in blocks(path, rows)])
+
+
+def blocks(path: Path, rows: int) -> list[Block]:
+    with closing(open_source(path)) as source:
+        return list(source.blocks(LEGS, rows=rows))
 
 
 def write(path: Path, table: pa.Table) -> Path:
@@ -72,7 +78,7 @@ def test_truncated_damaged_empty_and_foreign_files(tmp_path, legs_parquet):
     data = legs_parquet.read_bytes()
     half = tmp_path / "half.parquet"
     half.write_bytes(data[: len(data) // 2])
-    with pytest.raises(InputError, match="half.parquet: is a Parquet file cut off"):
+    with pytest.raises(InputError, match=r"half\.parquet: is a Parquet file cut off"):
         open_source(half)
     for content, words in ((b"", "is empty"), (b"leg_1,leg_2\n1,2\n", "is not a Parquet file")):
         half.write_bytes(content)
@@ -94,11 +100,11 @@ def test_a_damaged_page_is_noticed(tmp_path, readings):
     place = data.find(readings[100, 2].tobytes())
     data[place + 3] ^= 0x40  # still a number, only not the right one
     path.write_bytes(data)
-    with pytest.raises(InputError, match="legs.parquet: damaged after row 0"):
+    with pytest.raises(InputError, match=r"legs\.parquet: damaged after row 0"):
         numbers(path)
 
 
 def test_rows_are_named_by_number(legs_parquet):
-    blocks = list(open_source(legs_parquet).blocks(LEGS, rows=30))
-    assert blocks[0].place(0) == "row 1"
-    assert blocks[1].place(4) == "row 35"
+    first, second, *_ = blocks(legs_parquet, 30)
+    assert first.place(0) == "row 1"
+    assert second.place(4) == "row 35"

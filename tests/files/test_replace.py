@@ -38,7 +38,7 @@ def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path):
 def test_after_any_exception_the_old_file_is_untouched(tmp_path, error):
     path = tmp_path / "poses.csv"
     path.write_text("old")
-    with pytest.raises(error), replacing(path) as file:
+    with pytest.raises(error), replacing(path) as file:  # noqa: PT012
         file.write(b"new")
         raise error
     assert path.read_text() == "old"
@@ -73,3 +73,14 @@ def test_targets_that_cannot_be_files(tmp_path, name, words):
     with pytest.raises(GoughError, match=words), replacing(tmp_path / name):
         pass
     assert os.listdir(tmp_path) == ["pipe.csv"]
+
+
+def test_a_signal_right_after_the_file_is_made_leaves_nothing(tmp_path, monkeypatch):
+    def made_then_interrupted(path):
+        path.write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gough.files.replace._open_new", made_then_interrupted)
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "poses.csv"):
+        pass
+    assert os.listdir(tmp_path) == []

@@ -190,7 +190,7 @@ def _slow_block(layout: Layout, data: bytes, line: int, keep_bad: bool) -> Block
 
 
 def _first_line_end(data: bytes) -> int:
-    """Where the first line ends that is not inside quotation marks; 0 for nowhere."""
+    """Where the first line ends that is not inside quotation marks, or 0."""
     end = 0
     while (end := data.find(b"\n", end) + 1) and data.count(b'"', 0, end) % 2:
         pass
@@ -198,7 +198,7 @@ def _first_line_end(data: bytes) -> int:
 
 
 def _last_line_end(data: bytes, limit: int) -> int:
-    """Where the last line ends, up to `limit`, that is not inside quotation marks; 0 for nowhere."""
+    """Where the last line up to `limit` ends that is not inside quotation marks, or 0."""
     end = data.rfind(b"\n", 0, limit) + 1
     if b'"' not in data:
         return end

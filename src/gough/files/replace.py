@@ -45,8 +45,8 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         if file is not None:
             with suppress(OSError):  # closing writes what is buffered, which can fail again
                 file.close()
-            with suppress(OSError):
-                os.unlink(temporary)
+        with suppress(OSError):  # also where a signal came between making and naming the file
+            os.unlink(temporary)
         if isinstance(error, OSError):
             raise GoughError(f"{path}: {why(error)}; nothing was changed there") from None
         raise

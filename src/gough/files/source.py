@@ -65,7 +65,7 @@ class Source(Protocol):
 
 
 def file_format(path: str | Path) -> str:
-    """ "The format a name stands for: ".csv" or ".parquet".
+    """The format a name stands for, ".csv" or ".parquet".
 
     Raises:
         GoughError: the name ends in neither.
