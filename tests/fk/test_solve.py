@@ -1,5 +1,9 @@
 """Poses from readings: round trips, statuses, and all that a user may hand in."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -99,9 +103,31 @@ def test_a_row_does_not_depend_on_its_neighbours(name):
         apart = [gough.solve(platform, legs[i : i + part]) for i in range(0, 300, part)]
         position = np.concatenate([s.pose.position for s in apart])
         np.testing.assert_array_equal(position, together.pose.position)
+        wxyz = np.concatenate([s.pose.wxyz for s in apart])
+        np.testing.assert_array_equal(wxyz, together.pose.wxyz)
         np.testing.assert_array_equal(
             np.concatenate([s.iterations for s in apart]), together.iterations
         )
+
+
+@pytest.mark.slow
+def test_compiling_anew_changes_nothing(tmp_path):
+    """A process that compiles and one that loads the compiled code give the same bits."""
+    code = (
+        "import gough, hashlib\n"
+        "p = gough.Platform.load('rubin_camera')\n"
+        "s = gough.solve(p, gough.leg_lengths(p, p.sample_poses(500)))\n"
+        "print(hashlib.md5(s.pose.position.tobytes() + s.pose.wxyz.tobytes()).hexdigest())"
+    )
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, check=True
+        ).stdout
+        for _ in range(2)
+    ]
+    assert len(list(tmp_path.rglob("*.nbc"))) > 0
+    assert runs[0] == runs[1]
 
 
 def test_threads_change_nothing():

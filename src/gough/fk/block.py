@@ -1,10 +1,15 @@
-"""The bulk solver: blocks of poses, one vector instruction for several at a time."""
+"""The bulk solver: blocks of poses, one vector instruction for several at a time.
+
+Everything is compiled into `solve_rows`. Were its parts compiled apart, the process that
+compiles them would run other machine code for them than those that load `solve_rows` from the
+cache, and round some last digits differently.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.equations import SMALL, assess, newton_step
+from gough.fk.equations import SMALL, assess, inline, newton_step
 from gough.fk.jit import jit
 from gough.fk.layout import (
     COMPONENTS,
@@ -71,7 +76,7 @@ def solve_rows(constants, legs, guess, polynomial, tolerance, sweeps, first, las
     return troubled
 
 
-@jit()
+@inline
 def _load(constants, legs, start, last, readings, buffer, valid):
     """Readings of a block, leg by leg, and the struts they stand for.
 
@@ -92,7 +97,7 @@ def _load(constants, legs, start, last, readings, buffer, valid):
             valid[k] = take_reading(constants, legs, row, buffer, k, WIDTH)
 
 
-@jit()
+@inline
 def _has_lengths(buffer, k):
     good = True
     for i in range(6):
@@ -101,7 +106,7 @@ def _has_lengths(buffer, k):
     return good
 
 
-@jit()
+@inline
 def _load_lengths(constants, readings, buffer):
     """Lengths of all legs of a block as vector code; whether all of them are above zero."""
     inverse = constants[PER_SIZE]
@@ -117,7 +122,7 @@ def _load_lengths(constants, readings, buffer):
     return good == 6 * WIDTH
 
 
-@jit()
+@inline
 def _refine(constants, buffer, tolerance, sweeps):
     """Newton sweeps over the block until every pose has settled or `sweeps` are used up.
 
@@ -140,7 +145,7 @@ def _refine(constants, buffer, tolerance, sweeps):
             assess(constants, buffer, k, WIDTH)
 
 
-@jit()
+@inline
 def _largest_step(buffer):
     """Largest squared step of the sweep, infinite for NaN."""
     largest = 0.0
@@ -150,7 +155,7 @@ def _largest_step(buffer):
     return largest
 
 
-@jit()
+@inline
 def _wake(buffer, tolerance):
     """Set poses going again whose residual is above the tolerance; how many there are."""
     count = 0
@@ -161,7 +166,7 @@ def _wake(buffer, tolerance):
     return count
 
 
-@jit()
+@inline
 def _store(constants, buffer, legs, valid, start, last, tolerance, out):
     position, wxyz, residuals, iterations, verdicts = out
     troubled = 0
@@ -179,7 +184,7 @@ def _store(constants, buffer, legs, valid, start, last, tolerance, out):
     return troubled
 
 
-@jit()
+@inline
 def verdict(buffer, k, stride, tolerance, stroke):
     """What an assessed pose still needs."""
     if not buffer[RESIDUAL * stride + k] <= tolerance:

@@ -9,14 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from gough.fk.equations import inline, put_quaternion
-from gough.fk.jit import jit
 from gough.fk.layout import WIDTH
 
 CLAMP = 1.25  # readings further out than this share of the fitted range are drawn in to it
 SPAN = np.uint64(WIDTH)
 
 
-@jit()
+@inline
 def _scale(scaling, readings, u):
     """Readings as -1..1 over the fitted range; NaN becomes 0."""
     for leg in range(6):
@@ -27,7 +26,7 @@ def _scale(scaling, readings, u):
             u[leg * WIDTH + k] = value if value == value else 0.0
 
 
-@jit()
+@inline
 def _multiply(lower, u, upper, parent, variable):
     """Monomials of one degree (`upper`) from those of the degree below: parent times variable."""
     for m in range(len(parent)):
@@ -37,7 +36,7 @@ def _multiply(lower, u, upper, parent, variable):
             upper[o + k] = lower[p + k] * u[v + k]
 
 
-@jit()
+@inline
 def _accumulate(coefficients, monomials, total, first, last):
     """Add the terms of monomials first..last, two at a time, to the six outputs."""
     c = coefficients
@@ -57,7 +56,7 @@ def _accumulate(coefficients, monomials, total, first, last):
             total[o5 + k] += a5 * x + b5 * y
 
 
-@jit()
+@inline
 def _place(total, anchor, buffer):
     """Outputs as internal poses: position, and the quaternion (1, h) times the anchor."""
     w, x, y, z = anchor
