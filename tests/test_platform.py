@@ -125,7 +125,10 @@ WRONG_TOML = {
     "a field is missing": (TOML.replace("moving", "moved"), "moving: missing; expected six rows"),
     "home is missing": (TOML.replace("[home]", "[house]"), "home: missing; expected a [home]"),
     "empty": ("", "base: missing; expected six rows [x, y, z]"),
-    "unknown field": ("pivots = [0, 0, 1]\n" + TOML, "pivots: unknown field; did you mean pivot?"),
+    "unknown field": (
+        "pivots = [0, 0, 1]\n" + TOML,
+        "pivots: unknown field; did you mean 'pivot'?",
+    ),
     "unknown in a table": (TOML + "rotation = 3", "workspace.rotation: unknown field; did you"),
     "not a table": (
         "home = 3\n" + TOML.split("[home]")[0],
@@ -336,8 +339,8 @@ def test_wrong_workspaces_are_named(box: tuple, message: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("refrence", "no platform is called 'refrence'; did you mean 'reference'? The catalog has"),
-        ("", "no platform is called ''; The catalog has: dietmaier, linuxcnc_genhex, "),
+        ("refrence", "no platform is called 'refrence'; did you mean 'reference'? the catalog has"),
+        ("", "no platform is called ''; the catalog has dietmaier, linuxcnc_genhex, "),
         ("../catalog/reference", "no platform is called '../catalog/reference'; "),
         ("nowhere.toml", "nowhere.toml: cannot be read: No such file or directory"),
         ("nul\0.toml", "'nul\\x00.toml': cannot be read: embedded null byte"),

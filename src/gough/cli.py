@@ -10,7 +10,7 @@ from importlib import import_module
 
 import gough
 from gough.commands import COMMANDS, stopping
-from gough.errors import GoughError
+from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
 
@@ -70,11 +70,8 @@ def _dispatch(arguments: list[str]) -> int:
         print(f"gough {gough.__version__}")
         return 0
     if command not in COMMANDS:
-        import difflib
-
-        near = difflib.get_close_matches(command, COMMANDS, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise GoughError(f"no command {command!r}; {hint}Commands: {', '.join(COMMANDS)}")
+        near = suggestion(command, COMMANDS)
+        raise GoughError(f"no command {command!r}{near} commands are {', '.join(COMMANDS)}")
     import tyro
 
     run = import_module(f"gough.commands.{command}").run

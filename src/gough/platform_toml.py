@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import tempfile
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gough.checks import platform_field
-from gough.errors import GoughError, PlatformError
+from gough.errors import GoughError, PlatformError, suggestion
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -42,10 +41,9 @@ def catalog_text(name: str) -> str:
     """
     names = catalog_names()
     if name not in names:
-        near = difflib.get_close_matches(name, names, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
         raise PlatformError(
-            f"no platform is called {name!r}; {hint}The catalog has: {', '.join(names)}. "
+            f"no platform is called {name!r}{suggestion(name, names)} the catalog has "
+            f"{', '.join(names)}. "
             "The path of a platform of your own must end in .toml"
         )
     return resources.files("gough").joinpath("catalog", f"{name}.toml").read_text("utf-8")
@@ -163,9 +161,9 @@ def _home(table: dict) -> Pose:
 def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:
     for key in table:
         if key not in keys:
-            near = difflib.get_close_matches(key, keys, n=1)
-            hint = f"did you mean {prefix}{near[0]}? " if near else ""
-            raise PlatformError(f"{prefix}{key}: unknown field; {hint}Fields: {', '.join(keys)}")
+            raise PlatformError(
+                f"{prefix}{key}: unknown field{suggestion(key, keys)} fields are {', '.join(keys)}"
+            )
 
 
 def _value(value: object) -> str:

@@ -151,7 +151,7 @@ def test_version(gough):
         (["solve", "x.txt", "-p", "reference"], "must end in .csv or .parquet"),
         (["solve", "none.csv", "-p", "reference"], "none.csv: cannot be read: No such file"),
         (["solve", ".", "-p", "reference"], "must end in .csv or .parquet"),
-        (["platforms", "rubin"], "The catalog has"),
+        (["platforms", "rubin"], "the catalog has"),
     ],
 )
 def test_bad_usage_is_short_and_exits_with_2(gough, arguments, words):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gough.files.source import Source
     from gough.platform import Platform
 
+NOTICED = 2.0  # [s] of compiling that deserve a word
 STANDARD = "-"  # as in gough.files, which is too heavy to import for a help text
 # one rule, below the head
 RULE = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
@@ -52,6 +53,8 @@ def print_summary(report: Report, platform: Platform, out: str | None, screen: C
         f"{report.rows:,} rows in {report.seconds:.3g} s ({rate:,.0f} rows/s){target}",
         markup=False,
     )
+    if report.preparing > NOTICED:
+        screen.print(f"(before that {report.preparing:.0f} s to compile the solver, once)")
     residuals = not np.all(np.isnan(report.worst))
     heads = ["status", ">rows", ">share"] + ["worst residual"] * residuals
     table = plain_table(*heads)

@@ -74,6 +74,9 @@ def solve_file(
 
     def step(block: Block) -> dict[str, pa.Array]:
         readings = block.numbers(LEGS)
+        if report.rows == 0:
+            solve(platform, platform.home_legs, **solver)  # pyright: ignore[reportArgumentType]
+            report.start()
         solution = solve(platform, readings, **solver)  # pyright: ignore[reportArgumentType]
         status = solution.status
         report.add(solution.pose, readings, status, solution.residual)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 
-from gough.errors import InputError
+from gough.errors import InputError, suggestion
 
 LEGS = tuple(f"leg_{i}" for i in range(1, 7))
 POSITION = ("x", "y", "z")
@@ -57,9 +56,8 @@ def checked(where: str, found: Sequence[str], wanted: Sequence[str]) -> tuple[st
     """
     for name in wanted:
         if name not in found:
-            near = difflib.get_close_matches(name, found, n=1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise InputError(f"{where}: no column {name!r}; {hint}It has {_list(found)}")
+            near = suggestion(name, found)
+            raise InputError(f"{where}: no column {name!r}{near} the columns are {_list(found)}")
         if list(found).count(name) > 1:
             raise InputError(f"{where}: two columns are called {name!r}; rename or remove one")
     return tuple(wanted)

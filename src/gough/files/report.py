@@ -39,7 +39,8 @@ class Report:
         worst: the largest residual in each [platform unit].
         invalid: the first few invalid rows: where, and what is wrong.
         pose, legs, status: the first rows themselves, as many as were asked for.
-        seconds: time taken.
+        seconds: time taken by the rows.
+        preparing: time taken before them, to compile the solver and to fit its seed.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -51,10 +52,16 @@ class Report:
     legs: Array = field(default_factory=lambda: np.empty((0, 6)))
     status: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     seconds: float = 0.0
+    preparing: float = 0.0
 
     def __post_init__(self) -> None:
         self.counts = np.zeros(len(self.outcomes), np.int64)
         self.worst = np.full(len(self.outcomes), np.nan)
+        self._start = time.perf_counter()
+
+    def start(self) -> None:
+        """Begin to count the rows' time; what went before is `preparing`."""
+        self.preparing = time.perf_counter() - self._start
         self._start = time.perf_counter()
 
     @property
