@@ -30,6 +30,13 @@ _HOMES = {
     "leg_lengths": "gough.kinematics",
     "pose_covariance": "gough.kinematics",
     "singularity_distance": "gough.kinematics",
+    "AssemblyModes": "gough.modes.result",
+    "Certificate": "gough.modes.certificate",
+    "Choice": "gough.modes.choose",
+    "ModesStatus": "gough.modes.result",
+    "assembly_modes": "gough.modes.assembly",
+    "certify": "gough.modes.certificate",
+    "choose_mode": "gough.modes.choose",
 }
 
 __all__ = ["__version__", *sorted(_HOMES)]  # pyright: ignore[reportUnsupportedDunderAll]
@@ -48,6 +55,10 @@ if TYPE_CHECKING:
         pose_covariance,
         singularity_distance,
     )
+    from gough.modes.assembly import assembly_modes
+    from gough.modes.certificate import Certificate, certify
+    from gough.modes.choose import Choice, choose_mode
+    from gough.modes.result import AssemblyModes, ModesStatus
     from gough.platform import Platform
     from gough.pose import Pose
     from gough.rotary import RotaryArms

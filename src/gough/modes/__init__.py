@@ -1,0 +1,1 @@
+"""All the poses that six readings allow: tracked, counted, proven, ranked."""

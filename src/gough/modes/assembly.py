@@ -1,0 +1,250 @@
+"""Every assembly mode of a hexapod: all real poses that six readings allow."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gough.checks import Array, as_batch
+from gough.kinematics import equivalent_struts
+from gough.modes.certificate import certify
+from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows
+from gough.modes.follow import SHARE, Ends, follow
+from gough.modes.frames import Frames
+from gough.modes.result import AssemblyModes, ModesStatus
+from gough.modes.singular import Problem, classify, curve_of_poses, gather, merge
+from gough.modes.starts import SEED, Start, start_of
+from gough.modes.study import distinct
+from gough.modes.tracker import FINITE, LOST
+from gough.platform import Platform
+
+CHUNK = 128  # sets of readings per task
+# What readings whose paths do not all arrive apart are tried with: the share of the radius of
+# convergence that a step takes, and which of the machine's start systems.
+AGAIN = ((0.2, 0), (0.3, 1), (0.3, 2), (0.1, 3))
+DISTANT = 1e3  # normalised: starts beyond belong to no pose, where the base joints are fixed
+TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the legs
+
+
+def assembly_modes(
+    platform: Platform, legs: ArrayLike, *, threads: int | None = None
+) -> AssemblyModes:
+    """All real poses for leg readings, each with a certificate, and whether the list is complete.
+
+    All complex solutions are tracked from the machine's start system (found on its first use,
+    some hundredths of a second), so nothing depends on a guess. The same call gives the same
+    bits, whatever the number of threads and whatever other readings are beside.
+
+    Args:
+        legs: readings (6,) or (N, 6) of any kind of leg.
+        threads: at most so many; all the process may use if None.
+
+    Raises:
+        GoughError: legs of another shape, or not numbers. Rows with NaN or infinity are
+            answered with no poses and the status INVALID_INPUT.
+    """
+    readings = as_batch("legs", legs, (6,))
+    rows = readings.reshape(-1, 6)
+    start = start_of(platform)
+    base, lengths = equivalent_struts(platform, rows)
+    valid = np.all(np.isfinite(rows), axis=1) & np.all(lengths > 0, axis=1)
+    work = _Work(platform, start, base if platform.rotary is not None else base[:1], lengths)
+    outcome = _Outcome.empty(len(rows))
+    outcome.status[~valid] = ModesStatus.INVALID_INPUT
+    todo = np.flatnonzero(valid)
+    if start.singular:
+        _curves(platform, work, todo, outcome)
+    else:
+        _run(work, todo, outcome, threads)
+    return _assemble(platform, readings, start, outcome)
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """Readings in the platform's units, to be tracked from `start`."""
+
+    platform: Platform
+    start: Start
+    base: Array  # (N or 1, 6, 3)
+    lengths: Array  # (N, 6)
+
+    def normalised(self, rows: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Base joints (n or 1, 6, 3) and squared lengths (n, 6) of some rows."""
+        frames: Frames = self.start.frames
+        base = self.base if len(self.base) == 1 else self.base[rows]
+        return frames.base(base), frames.squares(self.lengths[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """Per row: status, counts of paths, normalised real poses."""
+
+    status: NDArray[np.uint8]
+    paths: NDArray[np.int32]  # (N, 4): real, complex, at infinity, singular
+    poses: list[tuple[Array, Array]]
+    multiple: list[NDArray[np.int32]]
+
+    @classmethod
+    def empty(cls, count: int) -> _Outcome:
+        none = (np.zeros((0, 4)), np.zeros((0, 3)))
+        return cls(
+            np.zeros(count, np.uint8), np.zeros((count, 4), np.int32), [none] * count,
+            [np.zeros(0, np.int32)] * count,
+        )  # fmt: skip
+
+
+def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int | None) -> None:
+    """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
+    chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
+    workers = min(len(chunks), threads or usable_cores())
+
+    def run(chunk: NDArray[np.int64]) -> NDArray[np.int64]:
+        return _solve(work, chunk, outcome)
+
+    if workers <= 1:
+        left = [run(chunk) for chunk in chunks]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            left = list(pool.map(run, chunks))
+    for row in np.concatenate([*left, np.zeros(0, np.int64)]).astype(int):
+        _solve_again(work, row, outcome)
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float) -> _Tracked:
+    """Paths from `start` to some rows, and their real ends."""
+    base, squares = work.normalised(rows)
+    moves = base.astype(complex) if start.base_moves else None
+    ends = follow((start.e, start.t), start.at, squares.astype(complex), moves, share=share)
+    shape = ends.ends.shape
+    e, t, kind = np.zeros((*shape, 4)), np.zeros((*shape, 3)), np.zeros(shape, np.uint8)
+    away, clean = np.zeros(shape, np.bool_), np.zeros(len(rows), np.bool_)
+    distant = np.abs(start.t).max(axis=1, initial=0.0) > DISTANT
+    finish_rows(
+        start.frames.moving, np.ascontiguousarray(base), np.ascontiguousarray(squares), ends.e,
+        ends.t, ends.ends, distant & (not start.base_moves), share < SHARE, TOLERANCE,
+        e, t, kind, away, clean,
+    )  # fmt: skip
+    return _Tracked(start, ends, e, t, kind, away, clean)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tracked:
+    """Ends of the P paths of n rows, and what `finish_rows` makes of them."""
+
+    start: Start
+    ends: Ends
+    e: Array  # (n, P, 4) the real poses
+    t: Array
+    kind: NDArray[np.uint8]  # (n, P)
+    away: NDArray[np.bool_]
+    clean: NDArray[np.bool_]  # (n,)
+
+    def record(self, k: int, outcome: _Outcome, row: int) -> None:
+        """Poses of the clean row k, whose place among all is `row`, with mirror images."""
+        start, real, away = self.start, self.kind[k] == REAL, int(self.away[k].sum())
+        e, t = self.e[k][real], self.t[k][real]
+        if start.paired:
+            away *= 2
+            mirrored = start.frames.reflect(e, t)
+            e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
+        outcome.poses[row] = e, t
+        outcome.multiple[row] = np.ones(len(e), np.int32)
+        outcome.paths[row] = len(e), start.count - len(e) - away, away, 0
+        outcome.status[row] = ModesStatus.COMPLETE
+
+
+def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
+    """Track a chunk; returns the rows that were not clean."""
+    tracked = _track(work, rows, work.start, SHARE)
+    for k in np.flatnonzero(tracked.clean):
+        tracked.record(int(k), outcome, int(rows[k]))
+    return rows[~tracked.clean]
+
+
+def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
+    """Shorter steps, then another start; what is still not clean is singular."""
+    tries = []
+    for share, number in AGAIN:
+        tracked = _track(work, np.array([row]), start_of(work.platform, number), share)
+        if tracked.clean[0]:
+            tracked.record(0, outcome, row)
+            return
+        tries.append(tracked)
+    best = max(tries, key=lambda one: np.sum(one.ends.ends == FINITE))
+    _record_singular(work, row, outcome, best)
+
+
+def _record_singular(work: _Work, row: int, outcome: _Outcome, tracked: _Tracked) -> None:
+    """Regular poses, and those that the paths which came together were heading for."""
+    start, ends = tracked.start, tracked.ends
+    e, t, kind, far = tracked.e[0], tracked.t[0], tracked.kind[0], tracked.away[0]
+    base, squares = work.normalised(np.array([row]))
+    how, real = ends.ends[0], kind == REAL
+    open_ends = ~far & ((how != FINITE) | (kind == DOUBTFUL))
+    problem = Problem(start.frames.moving, base[0], squares[0], TOLERANCE)
+    lost = int(np.sum((how == LOST) & ~far))
+    stopped = ends.e[0][open_ends], ends.t[0][open_ends]
+    e, t, paths = gather(problem, (e[real], t[real]), stopped)
+    if start.paired:
+        mirrored = start.frames.reflect(e, t)  # a flat pose is its own mirror image
+        both = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
+        e, t, paths = merge(*both, np.concatenate([paths, paths]))
+    found = classify(problem, e, t, paths)
+    e, t, multiple = found.e, found.t, found.paths
+    jumped = len(distinct(ends.e[0], ends.t[0], SAME)) < len(how)
+    away = int(np.sum(far)) * (2 if start.paired else 1)
+    doubtful = found.unresolved + lost + jumped > 0
+    regular, meet = int(np.sum(multiple == 1)), int(multiple[multiple > 1].sum())
+    outcome.poses[row], outcome.multiple[row] = (e, t), multiple
+    outcome.paths[row] = regular, max(0, start.count - regular - meet - away), away, meet
+    if found.curve:
+        outcome.status[row] = ModesStatus.SELF_MOTION
+    elif doubtful:
+        outcome.status[row] = ModesStatus.INCOMPLETE
+    elif meet:
+        outcome.status[row] = ModesStatus.SINGULAR
+    else:
+        outcome.status[row] = ModesStatus.COMPLETE
+
+
+def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> None:
+    """Samples of a curve of poses for each row of an architecturally singular machine."""
+    frames = work.start.frames
+    home = frames.normal(platform.home)
+    for row in rows:
+        base, squares = work.normalised(np.array([row]))
+        problem = Problem(frames.moving, base[0], squares[0], TOLERANCE)
+        e, t = curve_of_poses(problem, home, SEED)
+        outcome.poses[row], outcome.multiple[row] = (e, t), np.zeros(len(e), np.int32)
+        outcome.status[row] = ModesStatus.ALWAYS_SINGULAR
+
+
+def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) -> AssemblyModes:
+    """Poses in the platform's coordinates, certified, nearest to home first in each row."""
+    counts = np.array([len(e) for e, _ in outcome.poses], dtype=np.int64)
+    row = np.repeat(np.arange(len(counts)), counts)
+    e = np.concatenate([*(e for e, _ in outcome.poses), np.zeros((0, 4))])
+    t = np.concatenate([*(t for _, t in outcome.poses), np.zeros((0, 3))])
+    multiple = np.concatenate([*outcome.multiple, np.zeros(0, np.int32)]).astype(np.int32)
+    pose = start.frames.pose(e, t)
+    shift, turn = pose.distance(platform.home)
+    order = np.lexsort((shift / platform.size + turn, row))
+    row, pose, multiple = row[order], pose[order], multiple[order]
+    rows = legs.reshape(-1, 6)
+    proof = certify(platform, rows[row], pose)
+    return AssemblyModes(
+        platform=platform, legs=legs, pose=pose, row=row, multiplicity=multiple,
+        certificate=proof, status=outcome.status.reshape(legs.shape[:-1]),
+        paths=outcome.paths.reshape(*legs.shape[:-1], 4), solutions=start.count,
+    )  # fmt: skip

@@ -1,0 +1,173 @@
+"""Which mode is mine: filters that a real machine's pose passes, and a ranking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gough.checks import Array, as_batch
+from gough.errors import GoughError
+from gough.kinematics import joint_positions, leg_lengths
+from gough.modes.assembly import assembly_modes
+from gough.modes.result import AssemblyModes
+from gough.platform import Platform
+from gough.pose import Pose, wxyz_to_matrix
+
+BRANCH_SLACK = 1e-6  # [rad] readings of a pose that agree with the given ones
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The modes of readings, seen through filters.
+
+    Attributes:
+        passes: for each filter that applied, which of the M poses pass it.
+        rank: (M,) 0 for the best pose of its set of readings, then 1, 2, ...: poses that pass
+            more filters first, then those nearer to the pose that was asked for, or home.
+        count: () or (N,) how many poses of each set pass every filter.
+    """
+
+    passes: dict[str, NDArray[np.bool_]]
+    rank: NDArray[np.int64]
+    count: NDArray[np.int64]
+
+    @property
+    def passed(self) -> NDArray[np.bool_]:
+        """(M,) poses that pass every filter."""
+        everything = [np.ones(len(self.rank), dtype=bool), *self.passes.values()]
+        return np.logical_and.reduce(everything)
+
+    @property
+    def ambiguous(self) -> NDArray[np.bool_]:
+        """() or (N,) more than one pose passes every filter: readings alone cannot decide."""
+        return self.count > 1
+
+    @property
+    def best(self) -> NDArray[np.int64]:
+        """Indices of the poses of rank 0, one for each set of readings that has a pose."""
+        return np.flatnonzero(self.rank == 0)
+
+
+def choose_mode(
+    modes: AssemblyModes,
+    *,
+    near: Pose | None = None,
+    max_shift: float = np.inf,
+    max_turn: float = np.inf,
+    up: ArrayLike | None = None,
+    orientation: ArrayLike | None = None,
+    hint_error: float = 0.0,
+    max_swing: float = np.inf,
+) -> Choice:
+    """Filter and rank assembly modes by what a machine can do and what sensors say.
+
+    Always applied: "side" (the platform joints' centre lies on home's side of the base plate;
+    mirror images do not), "sign" (the sign of det J is home's, so no singularity had to be
+    crossed), "stroke" and "workspace" where the platform states them, "branch" for rotary legs
+    (the motors reach the pose on their own branch at these angles).
+
+    Args:
+        near: the last known pose, batch () or (N,): "near" passes poses within max_shift
+            [platform unit] and max_turn [rad] of it, and the ranking goes by distance to it.
+        up: (3,) or (N, 3), the vertical of the base as an inclinometer on the platform sees it,
+            in platform coordinates: "up" passes poses for which R times it is within
+            hint_error of the base's z axis.
+        orientation: (4,) or (N, 4) quaternion wxyz of an IMU: "orientation" passes poses that
+            are turned by at most hint_error from it.
+        hint_error: [rad], of `up` and `orientation`.
+        max_swing: [rad]: "swing" passes poses whose struts are turned by at most that from
+            their direction at home, at base and at platform joints.
+    """
+    if (up is not None or orientation is not None) and not hint_error > 0:
+        raise GoughError("hint_error: expected the sensor's error in rad, above 0, beside a hint")
+    platform, pose, row = modes.platform, modes.pose, modes.row
+    passes = {"side": same_side(platform, pose), "sign": modes.sign > 0}
+    if platform.stroke is not None:
+        low, high = platform.stroke.T
+        passes["stroke"] = np.all((modes.readings >= low) & (modes.readings <= high), axis=-1)
+    if platform.workspace is not None:
+        passes["workspace"] = platform.in_workspace(pose)
+    if platform.rotary is not None:
+        passes["branch"] = _on_branch(platform, pose, modes.readings)
+    if max_swing < np.inf:
+        passes["swing"] = swing(platform, pose) <= max_swing
+    target = platform.home if near is None else near
+    shift, turn = pose.distance(_per_row(target, row))
+    if near is not None:
+        passes["near"] = (shift <= max_shift) & (turn <= max_turn)
+    if up is not None:
+        vertical = as_batch("up", up, (3,))
+        vertical = vertical / np.linalg.norm(vertical, axis=-1, keepdims=True)
+        vertical = vertical[row] if vertical.ndim > 1 else vertical
+        x, y, z = (pose.rotation @ vertical[..., None])[..., 0].T
+        passes["up"] = np.arctan2(np.hypot(x, y), z) <= hint_error
+    if orientation is not None:
+        hint = Pose(np.zeros(3), as_batch("orientation", orientation, (4,)))
+        passes["orientation"] = pose.distance(_per_row(hint, row))[1] <= hint_error
+    return _ranked(modes, passes, shift / platform.size + turn)
+
+
+def ambiguous(platform: Platform, legs: ArrayLike, **filters: Any) -> NDArray[np.bool_]:
+    """Whether more than one pose with these readings passes every filter of `choose_mode`.
+
+    Args:
+        legs: (6,) or (N, 6).
+        filters: as for `choose_mode`.
+    """
+    return choose_mode(assembly_modes(platform, legs), **filters).ambiguous
+
+
+def same_side(platform: Platform, pose: Pose) -> NDArray[np.bool_]:
+    """Whether the platform joints' centre is on home's side of the base joints' plane."""
+    centre = platform.base.mean(axis=0)
+    normal = np.linalg.svd(platform.base - centre)[2][2]
+    height = (joint_positions(platform, pose).mean(axis=-2) - centre) @ normal
+    home = (joint_positions(platform, platform.home).mean(axis=-2) - centre) @ normal
+    return height * home > 0
+
+
+def swing(platform: Platform, pose: Pose) -> Array:
+    """Largest angle of a strut from its direction at home, in base or platform axes, (M,) [rad].
+
+    What limits the ball or universal joints at both ends.
+    """
+    base = platform.base
+    if platform.rotary is not None:
+        raise GoughError("max_swing: for rotary legs the directions of the rods depend on the arms")
+    home = joint_positions(platform, platform.home) - base
+    now = joint_positions(platform, pose) - base
+    home, now = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (home, now))
+    carried = home @ wxyz_to_matrix(platform.home.wxyz)  # in platform axes
+    seen = now @ pose.rotation
+    angles = [_angle(now, home), _angle(seen, carried)]
+    return np.maximum(*angles).max(axis=-1)
+
+
+def _angle(a: Array, b: Array) -> Array:
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+
+
+def _on_branch(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.bool_]:
+    """Whether the motors' own branch of the inverse kinematics gives the readings back."""
+    gap = leg_lengths(platform, pose) - readings
+    wrapped = np.abs(np.arctan2(np.sin(gap), np.cos(gap)))
+    return np.all(wrapped < BRANCH_SLACK, axis=-1)
+
+
+def _per_row(pose: Pose, row: NDArray[np.int64]) -> Pose:
+    return pose[row] if pose.batch else pose
+
+
+def _ranked(modes: AssemblyModes, passes: dict, distance: Array) -> Choice:
+    row = modes.row
+    failed = sum((~p for p in passes.values()), np.zeros(len(row), dtype=np.int64))
+    order = np.lexsort((distance, failed, row))
+    rank = np.empty(len(row), dtype=np.int64)
+    first = np.searchsorted(row, row)  # rows are in order
+    rank[order] = np.arange(len(row)) - first[order]
+    sets = modes.legs.shape[:-1]
+    count = np.bincount(row[failed == 0], minlength=int(np.prod(sets))).reshape(sets)
+    return Choice(passes, rank, count)

@@ -1,0 +1,165 @@
+"""What is known about the assembly modes of leg readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gough.checks import Array
+from gough.kinematics import (
+    assembly_sign,
+    equivalent_struts,
+    joint_positions,
+    singularity_distance,
+)
+from gough.modes.certificate import Certificate
+from gough.platform import Platform
+from gough.pose import Pose
+
+
+class ModesStatus(IntEnum):
+    """What is known about one set of readings; `text` is a sentence that says what to do."""
+
+    COMPLETE = 0
+    SINGULAR = 1
+    SELF_MOTION = 2
+    ALWAYS_SINGULAR = 3
+    INCOMPLETE = 4
+    INVALID_INPUT = 5
+
+    @property
+    def text(self) -> str:
+        """A sentence a user can act on."""
+        return _TEXTS[self]
+
+    @property
+    def label(self) -> str:
+        """The word written to files, such as "complete"."""
+        return self.name.lower()
+
+
+_TEXTS = {
+    ModesStatus.COMPLETE: "Every complex solution was found and told apart: no pose is missing.",
+    ModesStatus.SINGULAR: (
+        "At least one pose is singular: several solutions meet there, so the readings fix it "
+        "poorly, and it cannot be certified; every pose was found."
+    ),
+    ModesStatus.SELF_MOTION: (
+        "The platform can move with these legs locked: the rows of multiplicity 0 are samples "
+        "of that curve of poses."
+    ),
+    ModesStatus.ALWAYS_SINGULAR: (
+        "The legs of this machine are dependent at every pose (it is architecturally singular), "
+        "so readings never fix one: rows are samples of a curve of poses, if any pose has these "
+        "readings at all. Change the joints."
+    ),
+    ModesStatus.INCOMPLETE: (
+        "Some solutions could not be followed to these readings, so a pose may be missing: the "
+        "readings are very close to a singularity."
+    ),
+    ModesStatus.INVALID_INPUT: (
+        "A reading is not a finite number, or a length is not above zero: correct the row."
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyModes:
+    """Every real pose of one set of readings, or of N sets.
+
+    For N sets, poses of all sets follow one another, and `row` says whose each is;
+    `modes[i]` is the answer for set i, and iterating goes through the sets. Within a set the
+    pose nearest to home comes first.
+
+    Attributes:
+        platform: whose modes these are.
+        legs: (6,) or (N, 6), the readings.
+        pose: batch (M,).
+        row: (M,) set of readings that a pose belongs to; 0 for a single set.
+        multiplicity: (M,) 1 for a regular pose, above 1 where several solutions meet (a
+            singular pose), 0 for a sample of a curve of poses.
+        certificate: see `gough.certify`; batch (M,).
+        status: () or (N,) uint8, to be compared with `ModesStatus` members.
+        paths: (4,) or (N, 4): how many of the complex solutions are real, are complex, went
+            to infinity, met in singular ones.
+        solutions: complex solutions that this machine has for general readings.
+    """
+
+    platform: Platform
+    legs: Array
+    pose: Pose
+    row: NDArray[np.int64]
+    multiplicity: NDArray[np.int32]
+    certificate: Certificate
+    status: NDArray[np.uint8]
+    paths: NDArray[np.int32]
+    solutions: int
+
+    @cached_property
+    def residual(self) -> Array:
+        """(M,) largest difference between a strut's length and the one asked for [unit]."""
+        base, lengths = equivalent_struts(self.platform, self.readings)
+        struts = joint_positions(self.platform, self.pose) - base
+        return np.abs(np.linalg.norm(struts, axis=-1) - lengths).max(axis=-1, initial=0.0)
+
+    @cached_property
+    def singularity_distance(self) -> Array:
+        """(M,) see `gough.singularity_distance`; rotary poses that the motors reach only."""
+        return singularity_distance(self.platform, self.pose)
+
+    @cached_property
+    def sign(self) -> Array:
+        """(M,) sign of the Jacobian's determinant times that at home."""
+        return assembly_sign(self.platform, self.pose)
+
+    @property
+    def certified(self) -> NDArray[np.bool_]:
+        """(M,) exactly one pose with these readings lies within the certificate's radius."""
+        return self.certificate.certified
+
+    @property
+    def readings(self) -> Array:
+        """(M, 6) the readings that each pose belongs to."""
+        return self.legs.reshape(-1, 6)[self.row]
+
+    @property
+    def complete(self) -> NDArray[np.bool_]:
+        """() or (N,) no pose is missing."""
+        return np.isin(self.status, (ModesStatus.COMPLETE, ModesStatus.SINGULAR))
+
+    @cached_property
+    def counts(self) -> NDArray[np.int64]:
+        """() or (N,) how many poses there are."""
+        sets = int(np.prod(self.legs.shape[:-1]))
+        return np.bincount(self.row, minlength=sets).reshape(self.legs.shape[:-1])
+
+    def __len__(self) -> int:
+        """Number of sets of readings of a batch, or of poses of a single set."""
+        return len(self.legs) if self.legs.ndim > 1 else len(self.row)
+
+    def __getitem__(self, index: int) -> AssemblyModes:
+        if self.legs.ndim == 1:
+            raise IndexError("these are the modes of one set of readings; use .pose[index]")
+        index = range(len(self.legs))[index]
+        mine = self.row == index
+        proof = self.certificate
+        return replace(
+            self, legs=self.legs[index], pose=self.pose[mine], row=np.zeros(mine.sum(), int),
+            multiplicity=self.multiplicity[mine], status=self.status[index],
+            certificate=Certificate(proof.certified[mine], proof.radius[mine], proof.error[mine]),
+            paths=self.paths[index],
+        )  # fmt: skip
+
+    def __iter__(self) -> Iterator[AssemblyModes]:
+        return (self[k] for k in range(len(self)))
+
+    def __repr__(self) -> str:
+        if self.legs.ndim == 1:
+            label = ModesStatus(int(self.status)).label
+            return f"AssemblyModes({len(self.row)} poses, {label})"
+        return f"AssemblyModes({len(self.row)} poses of {len(self.legs)} sets of readings)"

@@ -1,0 +1,218 @@
+"""All poses of leg readings: complete, exact, repeatable, for every kind of leg."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from machines import ALL, TELESCOPIC, found, poses_of, random_platform
+
+import gough
+from gough.modes import assembly
+from gough.modes.follow import follow
+from gough.modes.result import ModesStatus
+from gough.modes.starts import find_start
+from gough.modes.study import distances
+
+
+@pytest.fixture(scope="module")
+def dietmaier() -> gough.AssemblyModes:
+    platform = gough.Platform.load("dietmaier")
+    return gough.assembly_modes(platform, platform.home_legs)
+
+
+def test_dietmaier_has_forty_real_poses(dietmaier):
+    assert len(dietmaier) == dietmaier.solutions == 40
+    assert dietmaier.paths.tolist() == [40, 0, 0, 0]
+    assert dietmaier.residual.max() <= 1e-12
+    assert dietmaier.certified.all()
+
+
+def test_dietmaiers_poses_are_proven_different(dietmaier):
+    """Each pose is farther from every other than both can be from their solutions."""
+    proof = dietmaier.certificate
+    for k in range(40):
+        shift, turn = dietmaier.pose[k].distance(dietmaier.pose)
+        apart = np.maximum(shift, turn)
+        apart[k] = np.inf
+        assert np.all(apart > 1e3 * (proof.error[k] + proof.error))
+
+
+def test_same_call_same_bits(dietmaier):
+    platform = dietmaier.platform
+    for _ in range(5):
+        again = gough.assembly_modes(platform, platform.home_legs)
+        assert np.array_equal(again.pose.position, dietmaier.pose.position)
+        assert np.array_equal(again.pose.wxyz, dietmaier.pose.wxyz)
+
+
+@pytest.mark.parametrize("name", ["reference", "reachy_mini"])
+def test_bits_do_not_depend_on_threads_or_neighbours(name):
+    platform = gough.Platform.load(name)
+    legs = gough.leg_lengths(platform, poses_of(platform, 300))
+    one = gough.assembly_modes(platform, legs, threads=1)
+    three = gough.assembly_modes(platform, legs, threads=3)
+    assert np.array_equal(one.pose.position, three.pose.position)
+    for k in (0, 7, 131, 299):
+        alone = gough.assembly_modes(platform, legs[k])
+        assert np.array_equal(alone.pose.position, one[k].pose.position)
+        assert np.array_equal(alone.pose.wxyz, one[k].pose.wxyz)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_truth_is_among_the_modes(name):
+    platform = gough.Platform.load(name)
+    truth = poses_of(platform, 200)
+    modes = gough.assembly_modes(platform, gough.leg_lengths(platform, truth))
+    assert found(modes, truth).all()
+    assert np.all(modes.status == ModesStatus.COMPLETE)
+    assert modes.certified.all()
+    assert modes.residual.max() <= 1e-12 * platform.size
+
+
+@pytest.mark.parametrize("name", [*TELESCOPIC, "rubin_simulink"])
+def test_newton_from_random_starts_finds_nothing_more(name):
+    from check_modes import check
+
+    line = check(gough.Platform.load(name), poses=12, starts=300)
+    _, poses, complete, truth, _, searches, unknown, _, _ = line
+    assert (complete, truth, unknown) == (poses, poses, 0)
+    assert searches > 1000
+
+
+def test_random_platforms_have_forty_solutions():
+    for seed in range(40):
+        assert find_start(random_platform(seed)).count == 40
+
+
+@pytest.mark.parametrize(
+    ("base", "moving", "planar", "count"),
+    [
+        (range(6), range(6), True, 40),
+        (range(6), [0, 0, 1, 1, 2, 2], False, 16),
+        ([0, 0, 1, 1, 2, 2], [0, 1, 1, 2, 2, 0], False, 16),
+        (range(6), [0, 0, 1, 1, 2, 3], False, 32),
+        (range(6), [0, 0, 0, 1, 1, 2], False, 8),
+    ],
+)
+def test_special_platforms_have_fewer_solutions(base, moving, planar, count):
+    """Counts from the literature: 6-3: 16 (Innocenti, Parenti-Castelli 1990), 6-4: 32."""
+    assert find_start(random_platform(4, base, moving, planar)).count == count
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("reference", 28), ("nasa_msfc", 28), ("linuxcnc_genhex", 16)]
+)
+def test_planar_machines_track_one_of_each_pair(name, count):
+    start = find_start(gough.Platform.load(name))
+    assert start.paired
+    assert (start.count, len(start.e)) == (count, count // 2)
+
+
+def test_another_seed_finds_the_same_count():
+    for name in ALL:
+        platform = gough.Platform.load(name)
+        assert find_start(platform, 11).count == find_start(platform, 12).count
+
+
+def test_stored_start_system_is_reproduced_and_proven(capsys, monkeypatch):
+    pytest.importorskip("flint")
+    import start_system
+
+    monkeypatch.setattr("sys.argv", ["start_system.py", "--check"])
+    assert start_system.main() == 0
+    said = capsys.readouterr().out
+    assert "certified: 40" in said
+    assert "same bits as stored" in said
+
+
+def test_all_complex_ends_are_proven_in_ball_arithmetic():
+    """Forty solutions of three platforms, real and complex, each proven, none twice."""
+    balls = pytest.importorskip("gough.modes.balls")
+    for seed in range(3):
+        platform = random_platform(seed)
+        start = find_start(platform)
+        base, squares = (
+            start.frames.base(platform.base),
+            start.frames.squares(platform.home_lengths),
+        )
+        ends = follow((start.e, start.t), start.at, squares[None].astype(complex))
+        e, t = ends.finite()
+        assert len(e) == 40
+        for k in range(40):
+            proof = balls.prove(base, start.frames.moving, squares, e[k], t[k], steps=2)
+            assert proof is not None
+            assert proof.error < 1e-12 * proof.radius
+        gaps = distances((e, t), (e, t)) + np.eye(40)
+        assert gaps.min() > 1e-4
+
+
+@pytest.mark.parametrize("name", ["dietmaier", "matlab_stewart", "reachy_mini"])
+def test_readings_that_fail_at_first_are_done_again(name, monkeypatch):
+    """With steps of twenty radii many paths are lost; the answer must be the same."""
+    platform = gough.Platform.load(name)
+    legs = gough.leg_lengths(platform, poses_of(platform, 30))
+    usual = gough.assembly_modes(platform, legs)
+    again, redone = assembly._solve_again, []
+    monkeypatch.setattr(assembly, "SHARE", 20.0)
+    monkeypatch.setattr(
+        assembly, "_solve_again", lambda *args: (redone.append(args[1]), again(*args))
+    )
+    hasty = gough.assembly_modes(platform, legs)
+    assert redone
+    assert np.array_equal(hasty.row, usual.row)
+    assert np.array_equal(hasty.status, usual.status)
+    assert np.abs(hasty.pose.position - usual.pose.position).max() < 1e-8 * platform.size
+
+
+def test_length_changes_and_pivot():
+    """The Rubin hexapod's own test: lengths are changes, rotation about a far pivot."""
+    platform = gough.Platform.load("rubin_simulink")
+    assert platform.legs == "length_change"
+    pose = poses_of(platform, 20)
+    modes = gough.assembly_modes(platform, gough.leg_lengths(platform, pose))
+    back = gough.leg_lengths(platform, modes.pose)
+    assert np.abs(back - modes.readings).max() < 1e-12 * platform.size
+
+
+def test_invalid_rows_are_answered_in_place():
+    platform = gough.Platform.load("reference")
+    legs = np.tile(platform.home_legs, (4, 1))
+    legs[1, 2], legs[2, 0] = np.nan, -5.0
+    modes = gough.assembly_modes(platform, legs)
+    invalid, complete = ModesStatus.INVALID_INPUT, ModesStatus.COMPLETE
+    assert modes.status.tolist() == [complete, invalid, invalid, complete]
+    assert modes.counts.tolist() == [16, 0, 0, 16]
+    assert len(modes) == 4
+    assert [len(one) for one in modes] == [16, 0, 0, 16]
+
+
+def test_unreachable_legs_have_no_pose_and_the_list_is_complete():
+    platform = gough.Platform.load("reference")
+    modes = gough.assembly_modes(platform, [655.5, 655.5, 655.5, 655.5, 655.5, 2000.0])
+    assert len(modes) == 0
+    assert modes.complete
+
+
+def test_no_readings_at_all():
+    platform = gough.Platform.load("reference")
+    modes = gough.assembly_modes(platform, np.zeros((0, 6)))
+    assert len(modes) == 0
+
+
+def test_wrong_shape_names_what_was_expected():
+    platform = gough.Platform.load("reference")
+    with pytest.raises(gough.GoughError, match=r"legs: expected \(\.\.\., 6\)"):
+        gough.assembly_modes(platform, [1.0, 2.0])
+
+
+def test_every_status_has_a_sentence():
+    for status in ModesStatus:
+        assert status.text.endswith(".")
+
+
+def test_start_system_is_part_of_the_package():
+    import gough.modes
+
+    assert (Path(gough.modes.__file__).parent / "start_system.npz").is_file()

@@ -1,0 +1,53 @@
+"""gough modes: table, file and figure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gough
+from gough.modes.command import run
+
+
+def test_dietmaier_prints_forty_certified_rows(capsys, tmp_path):
+    assert run((), platform="dietmaier", out=str(tmp_path / "modes.csv")) == 0
+    said = capsys.readouterr().out
+    assert "40 real poses, 40 certified" in said
+    lines = (tmp_path / "modes.csv").read_text().splitlines()
+    assert len(lines) == 41
+    assert sum(",true," in line for line in lines) == 40
+
+
+def test_parquet_of_many_readings_gives_the_poses_back(tmp_path, capsys):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    platform = gough.Platform.load("reference")
+    legs = gough.leg_lengths(platform, platform.sample_poses(5))
+    columns = {f"leg_{i + 1}": legs[:, i] for i in range(6)}
+    parquet.write_table(pa.table(columns), tmp_path / "legs.parquet")
+    out = tmp_path / "modes.parquet"
+    assert run((str(tmp_path / "legs.parquet"),), platform="reference", out=str(out)) == 0
+    table = parquet.read_table(out).to_pydict()
+    position = np.stack([table[k] for k in "xyz"], axis=-1)
+    pose = gough.Pose(position, np.stack([table[k] for k in ("qw", "qx", "qy", "qz")], axis=-1))
+    assert np.abs(gough.leg_lengths(platform, pose) - legs[table["row"]]).max() < 1e-9
+    assert "5 sets of readings" in capsys.readouterr().out
+
+
+def test_figure_is_written(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "modes.png"
+    assert run((), platform="linuxcnc_genhex", plot=str(picture)) == 0
+    assert picture.stat().st_size > 20_000
+
+
+@pytest.mark.parametrize("legs", [("1", "2"), ("1", "2", "3", "4", "5", "six"), ("no.csv",)])
+def test_bad_legs_are_explained(legs):
+    with pytest.raises(gough.GoughError, match=r"LEGS|no\.csv"):
+        run(legs, platform="reference")
+
+
+def test_invalid_readings_give_exit_code_1(capsys):
+    assert run(("nan", "1", "1", "1", "1", "1"), platform="reference") == 1
+    assert "correct the row" in capsys.readouterr().out
