@@ -1,0 +1,47 @@
+"""The few layers that the networks are made of."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+
+class Dense(nn.Module):
+    """act(W norm(x) + b), plus x where input and output have the same width."""
+
+    def __init__(self, inputs: int, outputs: int, *, norm: bool = True) -> None:
+        super().__init__()
+        self.residual = inputs == outputs
+        self.norm = nn.LayerNorm(inputs) if norm and self.residual else nn.Identity()
+        self.linear = nn.Linear(inputs, outputs)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = nn.functional.silu(self.linear(self.norm(x)))
+        return x + y if self.residual else y
+
+
+def dense_stack(inputs: int, width: int, layers: int, *, norm: bool = True) -> nn.Sequential:
+    """`layers` dense layers from `inputs` to `width` and on at that width."""
+    sizes = [inputs] + [width] * layers
+    return nn.Sequential(
+        *(Dense(a, b, norm=norm) for a, b in zip(sizes[:-1], sizes[1:], strict=True))
+    )
+
+
+class RadialBasis(nn.Module):
+    """Distances as the heights of evenly spaced bumps: (...) to (..., count).
+
+    Args:
+        count: number of Gaussians.
+        largest: distance of the last centre; the first is 0.
+    """
+
+    def __init__(self, count: int, largest: float = 1.05) -> None:
+        super().__init__()
+        centres = torch.linspace(0, largest, count, dtype=torch.float64)
+        self.register_buffer("centres", centres, persistent=False)
+        self.width = largest / (count - 1)
+
+    def forward(self, distance: Tensor) -> Tensor:
+        offset = (distance[..., None] - self.centres.to(distance.dtype)) / self.width
+        return torch.exp(-offset * offset / 2)
