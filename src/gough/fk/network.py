@@ -60,19 +60,15 @@ class NetworkSeed:
             GoughError: there is none of this name for this platform.
         """
         seed = cls.__new__(cls)
-        ours = {}
-        for file in _shipped_files():
-            content = file.read_bytes()
-            facts = _facts(_unseal(content, file.name), file.name)
-            if facts["platform"] == platform.digest:
-                ours[facts["kind"]] = (content, file.name)
+        ours = {facts["kind"]: file for file, facts in _shipped(platform)}
         if name not in ours:
             there = f"there are: {', '.join(sorted(ours))}" if ours else "there is none for it"
             raise GoughError(
                 f"no network {name!r} is shipped for platform {platform.name!r} as it is now "
                 f"({there}); train one with: gough train -p your-platform.toml"
             )
-        seed._open(platform, *ours[name], threads)
+        content = resources.files("gough").joinpath("weights", ours[name]).read_bytes()
+        seed._open(platform, content, ours[name], threads)
         return seed
 
     def _open(self, platform: Platform, content: bytes, where: str, threads: int) -> None:
@@ -222,6 +218,21 @@ def _shipped_files() -> list:
     if not files.is_dir():
         return []
     return sorted((f for f in files.iterdir() if f.name.endswith(".onnx")), key=lambda f: f.name)
+
+
+def shipped_names(platform: Platform) -> list[str]:
+    """Networks that come with the package for a platform, as it is now."""
+    return sorted(facts["kind"] for _, facts in _shipped(platform))
+
+
+def _shipped(platform: Platform) -> list[tuple[str, dict]]:
+    """File name and facts of each of them."""
+    out = []
+    for file in _shipped_files():
+        facts = _facts(_unseal(file.read_bytes(), file.name), file.name)
+        if facts["platform"] == platform.digest:
+            out.append((file.name, facts))
+    return out
 
 
 def _session(content: bytes, where: str, threads: int):
