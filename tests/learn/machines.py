@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from gough import Platform, Workspace
-from gough.learn.config import DataConfig, ModelConfig, RunConfig, TrainConfig
+from gough.learn.config import DataConfig, ModelConfig, OptimiserConfig, RunConfig, TrainConfig
 from gough.learn.models import PoseNetwork, Scaling, build
 
 
@@ -46,6 +46,7 @@ def tiny(steps: int = 20, **run) -> TrainConfig:
     return TrainConfig(
         model=ModelConfig("resmlp", {"width": 16, "depth": 2}),
         data=DataConfig(batch=64, test=100),
+        optimiser=OptimiserConfig(lr=2e-2, warmup=5),
         run=RunConfig(steps=steps, threads=1, device="cpu", **run),
     )
 

@@ -66,7 +66,7 @@ def test_what_is_read_out_is_a_sum_of_functions_of_single_legs():
     """Why the head alone has to learn how legs act together; see the module's docstring."""
     model = network("disgnet", reference(), width=16)
     seen = []
-    model.head.register_forward_pre_hook(lambda module, args: seen.append(args[0].detach()))
+    model.readout.register_forward_pre_hook(lambda module, args: seen.append(args[0].detach()))
 
     def pooled(x):
         model.network(x[None])

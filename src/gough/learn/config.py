@@ -57,8 +57,10 @@ class OptimiserConfig:
     """Learning rate at its highest."""
     weight_decay: float = 0.0
     """Decoupled weight decay."""
-    schedule: Literal["linear", "constant"] = "linear"
-    """linear: after `hold` of the run the rate falls to zero at its end."""
+    schedule: Literal["falling", "constant"] = "falling"
+    """falling: after `hold` of the run the rate falls to zero at its end."""
+    power: float = 2.0
+    """The rate falls as this power of the time left; 1: along a line."""
     warmup: int = 200
     """Steps over which the rate rises from zero."""
     hold: float = 0.3
@@ -83,6 +85,8 @@ class RunConfig:
     """auto, cpu, cuda or cuda:1; auto takes a GPU if there is one."""
     threads: int | None = None
     """CPU threads; none: as many as PyTorch takes."""
+    dtype: Literal["float32", "float64"] = "float32"
+    """Of the weights."""
     shards: int = 1
     """Parts that a step's samples are drawn in; at least the number of processes."""
     checkpoint_every: float = 120.0

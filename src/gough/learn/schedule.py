@@ -15,8 +15,8 @@ def learning_rate(config: OptimiserConfig, step: int, progress: float) -> float:
     rate = config.lr
     if config.warmup:
         rate *= min(1.0, (step + 1) / config.warmup)
-    if config.schedule == "linear" and progress > config.hold:
-        rate *= max(0.0, (1 - progress) / (1 - config.hold))
+    if config.schedule == "falling" and progress > config.hold:
+        rate *= max(0.0, (1 - progress) / (1 - config.hold)) ** config.power
     return rate
 
 

@@ -106,6 +106,7 @@ class Trainer:
         scaling = Scaling.of(platform, config.data.same_assembly)
         self.model = build(config.model.kind, platform, scaling, **config.model.options)
         self.model.to(self.device)
+        self.model.cast(getattr(torch, config.run.dtype))
         self.optimiser = _optimiser(config, self.model)
         self.average = self._weights() if config.optimiser.average else {}
         self.stream = Stream(

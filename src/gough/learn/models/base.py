@@ -99,6 +99,14 @@ class PoseNetwork(nn.Module):
         """The dtype of the weights; readings and poses are float64 whatever it is."""
         return next(self.parameters()).dtype
 
+    def cast(self, dtype: torch.dtype) -> None:
+        """Change the dtype of the weights; that of scales and distances stays float64."""
+        exact = {n: b for n, b in self.named_buffers() if b.dtype == torch.float64}
+        self.to(dtype)
+        for name, value in exact.items():
+            owner, _, key = name.rpartition(".")
+            setattr(self.get_submodule(owner), key, value)
+
     def network(self, x: Tensor) -> Tensor:
         """Raw numbers (N, outputs) for normalised readings (N, 6), both in `dtype`."""
         raise NotImplementedError

@@ -29,7 +29,7 @@ from torch import Tensor, nn
 from gough.learn.graph import NODES
 from gough.learn.models.base import Scaling
 from gough.learn.models.graph_base import GraphNetwork
-from gough.learn.models.layers import Dense, RadialBasis, dense_stack
+from gough.learn.models.layers import Dense, RadialBasis, Standardise, dense_stack
 from gough.platform import Platform
 
 
@@ -61,9 +61,12 @@ class DisGNet(GraphNetwork):
         self.left = Dense(width, width)
         self.right = Dense(width, width)
         self.mix = nn.Linear(width, width, bias=False)
+        self.readout = Standardise(width)
         self.head = nn.Sequential(*(Dense(width, width) for _ in range(head)), nn.LayerNorm(width))
         self.last = nn.Linear(width, self.outputs)
         self.start_near_home(self.last)
+        with torch.no_grad():  # most of the sum is constant; see to it that the head sees the rest
+            self.readout.start(self.pooled(self.edges(torch.randn(512, 6))))
 
     def network(self, x: Tensor) -> Tensor:
         edges = self.edges(x)
@@ -79,10 +82,14 @@ class DisGNet(GraphNetwork):
         """
         h = self._nodes(order) * self._pair(matrix, matrix.mT)  # (N, 12, 12, H)
         message = torch.einsum("nujh,njvh->nuvh", self.left(h), self.right(h)) / NODES
-        return self._read(h + self.mix(message))
+        return self._finish((h + self.mix(message)).sum((-3, -2)) / NODES)
 
     def structured(self, edges: Tensor) -> Tensor:
         """Raw numbers (N, 12) for scaled lengths (N, 6) of the legs' edges."""
+        return self._finish(self.pooled(edges))
+
+    def pooled(self, edges: Tensor) -> Tensor:
+        """z (N, H), structured, for scaled lengths (N, 6) of the legs' edges."""
         nodes = self._nodes(torch.arange(NODES, device=edges.device))  # (12, 12, H)
         constant = nodes * self._pair(self.ring_matrix.to(edges), self.ring_matrix.to(edges))
         fixed = self._no_leg(edges)
@@ -95,7 +102,7 @@ class DisGNet(GraphNetwork):
         p = p0 + torch.cat([self.left(down), self.left(up)], dim=1)  # (N, 12, H)
         q = q0 + torch.cat([self.right(up), self.right(down)], dim=1)
         message = self.mix((p * q).sum(1) / NODES)  # (N, H)
-        return self._finish(h0 + (up + down).sum(1) + message)
+        return (h0 + (up + down).sum(1) + message) / NODES
 
     def _nodes(self, order: Tensor) -> Tensor:
         """(12, 12, H)"""
@@ -113,8 +120,5 @@ class DisGNet(GraphNetwork):
         out[base, top] = out[top, base] = 0
         return out
 
-    def _read(self, h: Tensor) -> Tensor:
-        return self._finish(h.sum((-3, -2)))
-
     def _finish(self, pooled: Tensor) -> Tensor:
-        return self.last(self.head(pooled / NODES))
+        return self.last(self.head(self.readout(pooled)))

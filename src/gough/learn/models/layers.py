@@ -45,3 +45,22 @@ class RadialBasis(nn.Module):
     def forward(self, distance: Tensor) -> Tensor:
         offset = (distance[..., None] - self.centres.to(distance.dtype)) / self.width
         return torch.exp(-offset * offset / 2)
+
+
+class Standardise(nn.Module):
+    """gain * x + bias, started so that its output has mean 0 and spread 1 over given samples."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.gain = nn.Parameter(torch.ones(width))
+        self.bias = nn.Parameter(torch.zeros(width))
+
+    @torch.no_grad()
+    def start(self, x: Tensor) -> None:
+        """Fit gain and bias to samples (N, width)."""
+        spread = x.std(0) + 1e-6 * x.abs().mean()
+        self.gain.copy_(1 / spread)
+        self.bias.copy_(-x.mean(0) / spread)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return x * self.gain + self.bias
