@@ -5,6 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from learn.machines import network, random_platform, reference
 
+from gough import leg_lengths
+
 
 def gradients(model, value):
     model.zero_grad()
@@ -87,3 +89,16 @@ def test_matrix_is_that_of_the_graph(form):
     E = model.matrix(model.edges(torch.zeros(1, 6).double()))[0]
     assert torch.equal(E, E.mT)
     np.testing.assert_array_equal(E.numpy() > 0, model.graph.adjacency)
+
+
+def test_tables_agree_with_the_exact_form():
+    platform = reference()
+    model = network("disgnet", platform)
+    legs = torch.tensor(leg_lengths(platform, platform.sample_poses(200, 5)))
+    exact = model.raw(legs)
+    model.train()
+    assert (model.raw(legs) - exact).abs().max() < 1e-5 * exact.abs().max()
+    model.table = 128
+    assert (model.raw(legs) - exact).abs().max() < 1e-10 * exact.abs().max()
+    model.table = 0
+    torch.testing.assert_close(model.raw(legs), exact, rtol=1e-12, atol=1e-12)

@@ -40,7 +40,7 @@ class RadialBasis(nn.Module):
         super().__init__()
         centres = torch.linspace(0, largest, count, dtype=torch.float64)
         self.register_buffer("centres", centres, persistent=False)
-        self.width = largest / (count - 1)
+        self.width = 1.5 * largest / (count - 1)  # smooth enough for short series
 
     def forward(self, distance: Tensor) -> Tensor:
         offset = (distance[..., None] - self.centres.to(distance.dtype)) / self.width
