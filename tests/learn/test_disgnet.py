@@ -97,7 +97,7 @@ def test_tables_agree_with_the_exact_form():
     legs = torch.tensor(leg_lengths(platform, platform.sample_poses(200, 5)))
     exact = model.raw(legs)
     model.train()
-    assert (model.raw(legs) - exact).abs().max() < 1e-5 * exact.abs().max()
+    assert (model.raw(legs) - exact).abs().max() < 1e-4 * exact.abs().max()
     model.table = 128
     assert (model.raw(legs) - exact).abs().max() < 1e-10 * exact.abs().max()
     model.table = 0

@@ -77,7 +77,7 @@ class NetworkSeed:
         _check_platform(platform, self.facts, where)
         self._session = _session(content, where, threads)
         self.name = self.facts["kind"]
-        self.leg_range: Array = np.array(self.facts["scaling"]["leg_range"])
+        self.leg_range: Array = np.array(self.facts["leg_range"])
         self._platform = platform
 
     def guess(self, legs: Array) -> Pose:

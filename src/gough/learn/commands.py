@@ -79,7 +79,7 @@ def train(
     seed: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,
     device: Annotated[str | None, arg(metavar="DEVICE", help_behavior_hint="")] = None,
     workspace: WorkspaceBox = None,
-    preset: Preset = PRESETS["default"],  # pyright: ignore[reportInvalidTypeForm]
+    preset: Annotated[Preset, arg(prefix_name=False)] = PRESETS["default"],  # pyright: ignore[reportInvalidTypeForm]
 ) -> int:
     """Train a first guess for a platform, ten minutes unless told otherwise.
 
@@ -151,8 +151,7 @@ def evaluate(
     if train_peers is not None:
         chosen += loop.train_peers(machine, folder, train_peers)
     rows = loop.evaluate(machine, chosen, poses=poses, same_assembly=same_assembly)
-    console = Console()
-    console.print(loop.table(machine, rows), width=max(console.width, 170))
+    Console(width=max(Console().width, 200)).print(loop.table(machine, rows))
     if json is not None:
         json.write_text(loop.to_json(rows))
     return 0

@@ -75,6 +75,8 @@ class RunConfig:
 
     budget: str | None = None
     """Time to train, such as 90s, 30m or 2h; the schedule fits itself to it."""
+    clock: Literal["wall", "processor"] = "wall"
+    """What a budget counts: time, or this process's processor time (on a shared machine)."""
     steps: int | None = None
     """Number of steps, instead of a budget: such a run can be repeated bit for bit."""
     epochs: int | None = None

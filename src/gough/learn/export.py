@@ -24,6 +24,7 @@ from gough.fk.network import FORMAT, seal
 from gough.learn.checkpoint import load_tensors, save_tensors, write_whole
 from gough.learn.config import TrainConfig
 from gough.learn.models import PoseNetwork, Scaling, build
+from gough.learn.models.base import reading_range
 from gough.platform import Platform
 
 WEIGHTS, NETWORK = "weights.safetensors", "network.onnx"
@@ -47,6 +48,7 @@ def facts_of(model: PoseNetwork, config: TrainConfig, record: dict) -> dict:
         "platform": model.platform.digest,
         "platform_name": model.platform.name,
         "unit": model.platform.unit,
+        "leg_range": reading_range(model.platform).tolist(),
         "scaling": {name: value.tolist() for name, value in vars(model.scaling).items()},
         "config": json.loads(config.to_json()),
         "record": record,

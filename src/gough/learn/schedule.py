@@ -27,7 +27,7 @@ class Clock:
     second): a machine that slept, or a process that was stopped, loses only the time it slept.
 
     Attributes:
-        elapsed: seconds trained so far, over all resumptions.
+        elapsed: seconds trained so far, over all resumptions, by the configuration's clock.
     """
 
     def __init__(self, config: TrainConfig) -> None:
@@ -37,8 +37,9 @@ class Clock:
             whole = seconds(config.run.budget or "10m")
             self.budget = whole - min(RESERVE * whole, MOST_RESERVED)
         self.elapsed = 0.0
+        self._now = time.process_time if config.run.clock == "processor" else time.monotonic
         self._typical = 0.0
-        self._last = time.monotonic()
+        self._last = self._now()
 
     def progress(self, step: int) -> float:
         """Share of the run done when `step` steps are, 1 at its end."""
@@ -54,7 +55,7 @@ class Clock:
 
     def tick(self) -> None:
         """Count the time since the last call."""
-        now = time.monotonic()
+        now = self._now()
         passed = now - self._last
         self._last = now
         self.elapsed += min(passed, max(1.0, 20 * self._typical)) if self._typical else passed

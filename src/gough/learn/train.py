@@ -222,6 +222,7 @@ class Trainer:
         """What is said about the run wherever its weights go."""
         return {
             "seconds": round(self.clock.elapsed, 1),
+            "clock": self.config.run.clock,
             "steps": self.step,
             "samples": self.step * self.config.data.batch,
             "seed": self.config.run.seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -14,10 +15,12 @@ from gough.kinematics import assembly_sign, leg_lengths
 from gough.learn.geometry import euler_to_matrix, quaternion_to_matrix
 from gough.learn.rotation import nearest_rotation
 from gough.platform import Platform
+from gough.pose import Pose, wxyz_product
 
 Rotation = Literal["quaternion", "nine", "euler"]
 OUTPUTS = {"quaternion": 7, "nine": 12, "euler": 6}
 SCALING_POSES = 20_000
+WIDER = 0.01  # of the range of readings, to either side
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +72,24 @@ class Scaling:
         )
 
 
+def reading_range(platform: Platform) -> np.ndarray:
+    """(6, 2) lowest and highest reading over the workspace, a little widened.
+
+    Over sampled poses and the corners of the box, where the extremes mostly are.
+    """
+    box = platform._workspace()
+    edges = np.concatenate([box.translation, np.radians(box.rotation_deg)])  # (6, 2)
+    corners = np.array(list(product(*edges)))  # (64, 6)
+    turns = Pose.from_euler(np.zeros(3), corners[:, 3:]).wxyz
+    home = platform.home
+    poses = Pose(home.position + corners[:, :3], wxyz_product(home.wxyz, turns))
+    samples = platform.sample_poses(SCALING_POSES, seed=0)
+    legs = np.concatenate([leg_lengths(platform, p) for p in (poses, samples)])
+    low, high = np.nanmin(legs, axis=0), np.nanmax(legs, axis=0)
+    spread = WIDER * (high - low)
+    return np.stack([low - spread, high + spread], axis=-1)
+
+
 class PoseNetwork(nn.Module):
     """A network from readings (N, 6) to poses relative to home.
 
@@ -100,8 +121,9 @@ class PoseNetwork(nn.Module):
         return next(self.parameters()).dtype
 
     def cast(self, dtype: torch.dtype) -> None:
-        """Change the dtype of the weights; that of scales and distances stays float64."""
-        exact = {n: b for n, b in self.named_buffers() if b.dtype == torch.float64}
+        """Change the dtype of the weights; that of scales and distances stays."""
+        kept = self.state_dict().keys()
+        exact = {n: b for n, b in self.named_buffers() if n not in kept}
         self.to(dtype)
         for name, value in exact.items():
             owner, _, key = name.rpartition(".")
