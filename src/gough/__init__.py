@@ -16,6 +16,14 @@ _HOMES = {
     "GoughError": "gough.errors",
     "InputError": "gough.errors",
     "PlatformError": "gough.errors",
+    "PolynomialSeed": "gough.fk.seeds",
+    "PoseSeed": "gough.fk.seeds",
+    "Seed": "gough.fk.seeds",
+    "Event": "gough.fk.tracker",
+    "Solution": "gough.fk.status",
+    "Status": "gough.fk.status",
+    "Tracker": "gough.fk.tracker",
+    "solve": "gough.fk.solve",
     "assembly_sign": "gough.kinematics",
     "jacobian": "gough.kinematics",
     "joint_positions": "gough.kinematics",
@@ -28,6 +36,10 @@ __all__ = ["__version__", *sorted(_HOMES)]  # pyright: ignore[reportUnsupportedD
 
 if TYPE_CHECKING:
     from gough.errors import GoughError, InputError, PlatformError
+    from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed
+    from gough.fk.solve import solve
+    from gough.fk.status import Solution, Status
+    from gough.fk.tracker import Event, Tracker
     from gough.kinematics import (
         assembly_sign,
         jacobian,

@@ -63,6 +63,8 @@ def load(name_or_path: str | Path) -> Platform:
         raise PlatformError(f"{path}: not a text file; expected TOML") from None
     except OSError as error:
         raise PlatformError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a NUL in the path
+        raise PlatformError(f"{text_name!r}: cannot be read: {error}") from None
     return from_toml(text, where=str(path))
 
 
@@ -73,6 +75,10 @@ def from_toml(text: str, where: str = "platform") -> Platform:
     except tomllib.TOMLDecodeError as error:
         raise PlatformError(f"{where}: not valid TOML: {error}") from None
     except GoughError as error:
+        raise PlatformError(f"{where}: {error}") from None
+    except RecursionError:
+        raise PlatformError(f"{where}: lists are nested too deeply for a platform") from None
+    except ValueError as error:  # an integer of thousands of digits
         raise PlatformError(f"{where}: {error}") from None
 
 
@@ -147,7 +153,11 @@ def _home(table: dict) -> Pose:
     if "euler_deg" in table:
         angles = platform_field("home.euler_deg", table["euler_deg"], (3,))
         return Pose.from_euler(position, np.radians(angles))
-    return Pose(position, platform_field("home.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,)))
+    wxyz = platform_field("home.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,))
+    try:
+        return Pose(position, wxyz)
+    except GoughError as error:
+        raise PlatformError(f"home.{error}") from None
 
 
 def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ class Solution:
         numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
         return {s: int(numbers[s]) for s in Status if numbers[s]}
 
-    def __getitem__(self, index: object) -> Solution:
+    def __getitem__(self, index: Any) -> Solution:
         covariance = None if self.covariance is None else self.covariance[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
