@@ -166,10 +166,11 @@ def test_a_sleeping_machine_loses_no_budget(monkeypatch):
 
 def test_the_rate_rises_stays_and_falls_to_zero():
     told = PRESETS["default"].optimiser
-    rate = [learning_rate(told, step, step / 1000) for step in range(1001)]
+    rate = [learning_rate(told, step, step / 10_000) for step in range(10_001)]
     assert rate[0] == pytest.approx(told.lr / 200)
-    assert max(rate) == rate[200] == rate[300] == told.lr
-    assert np.all(np.diff(rate[300:]) < 0)
+    assert max(rate) == rate[200] == rate[3000] == told.lr
+    assert np.all(np.diff(rate[3000:]) < 0)
+    assert learning_rate(told, 5, 0.05) == told.lr  # a run of a hundred steps
     assert rate[-1] == 0
     constant = PRESETS["paper"].optimiser
     assert {learning_rate(constant, s, s / 10) for s in range(11)} == {1e-3}

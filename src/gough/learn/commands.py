@@ -79,7 +79,7 @@ def train(
     seed: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,
     device: Annotated[str | None, arg(metavar="DEVICE", help_behavior_hint="")] = None,
     workspace: WorkspaceBox = None,
-    preset: Annotated[Preset, arg(prefix_name=False)] = PRESETS["default"],  # pyright: ignore[reportInvalidTypeForm]
+    preset: Annotated[Preset, arg(name="")] = PRESETS["default"],  # pyright: ignore[reportInvalidTypeForm]
 ) -> int:
     """Train a first guess for a platform, ten minutes unless told otherwise.
 

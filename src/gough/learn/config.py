@@ -29,7 +29,7 @@ class ModelConfig:
 class DataConfig:
     """What it learns from."""
 
-    batch: int = 1000
+    batch: int = 500
     """Samples per step, over all processes together."""
     samples: int | None = None
     """Size of a fixed training set; none: every step draws fresh samples."""
@@ -62,7 +62,7 @@ class OptimiserConfig:
     power: float = 2.0
     """The rate falls as this power of the time left; 1: along a line."""
     warmup: int = 200
-    """Steps over which the rate rises from zero."""
+    """Steps over which the rate rises from zero, at most 5 % of the run."""
     hold: float = 0.3
     """Share of the run for which the rate stays."""
     average: float = 0.0
@@ -178,7 +178,9 @@ def seconds(text: str) -> float:
 
 PRESETS: dict[str, TrainConfig] = {
     "default": TrainConfig(run=RunConfig(budget="10m")),
-    "disgnet": TrainConfig(model=ModelConfig("disgnet"), run=RunConfig(budget="30m")),
+    "disgnet": TrainConfig(
+        model=ModelConfig("disgnet"), data=DataConfig(batch=1000), run=RunConfig(budget="30m")
+    ),
     "wide": TrainConfig(data=DataConfig(same_assembly=True), run=RunConfig(budget="15m")),
     "paper": TrainConfig(
         model=ModelConfig("disgnet"),

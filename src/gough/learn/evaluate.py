@@ -110,7 +110,7 @@ def per_thousand(seed: Seed, legs: Array, repeats: int = 7) -> float:
 
 def train_peers(platform: Platform, folder: Path, budget: str, *, seed: int = 0,
                 threads: int | None = None) -> list[str]:  # fmt: skip
-    """Train every network for the same time, with the default recipe; their folders.
+    """Train every network for the same processor time, by the default recipe; their folders.
 
     Runs that the folder holds already are finished, not repeated.
     """
@@ -124,7 +124,7 @@ def train_peers(platform: Platform, folder: Path, budget: str, *, seed: int = 0,
     out = []
     for kind in MODELS:
         config = replace(PRESETS["default"], model=ModelConfig(kind))  # pyright: ignore
-        config = config.with_run(budget=budget, seed=seed, threads=threads)
+        config = config.with_run(budget=budget, clock="processor", seed=seed, threads=threads)
         run = folder / kind
         if not (run / NETWORK).exists():
             train(platform, config, run, resume=(run / "config.json").exists())

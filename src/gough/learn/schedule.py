@@ -8,13 +8,14 @@ from gough.learn.config import OptimiserConfig, TrainConfig, seconds
 
 RESERVE = 0.03  # share of a budget kept for the last checkpoint and the export,
 MOST_RESERVED = 10.0  # at most so many seconds
+LONGEST_WARMUP = 0.05  # share of a run after which the rate has risen, however few its steps
 
 
 def learning_rate(config: OptimiserConfig, step: int, progress: float) -> float:
     """The rate of step number `step`, counted from 0, with `progress` in 0..1 of the run done."""
     rate = config.lr
     if config.warmup:
-        rate *= min(1.0, (step + 1) / config.warmup)
+        rate *= min(1.0, max((step + 1) / config.warmup, progress / LONGEST_WARMUP))
     if config.schedule == "falling" and progress > config.hold:
         rate *= max(0.0, (1 - progress) / (1 - config.hold)) ** config.power
     return rate
