@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
 
 from gough import Platform, Workspace
 from gough.learn.config import DataConfig, ModelConfig, OptimiserConfig, RunConfig, TrainConfig
-from gough.learn.models import PoseNetwork, Scaling, build
+from gough.learn.models import Scaling, build
 
 
 def reference() -> Platform:
@@ -31,7 +32,7 @@ def random_platform(rng: np.random.Generator) -> Platform:
     )  # fmt: skip
 
 
-def network(kind: str, platform: Platform, seed: int = 0, **options) -> PoseNetwork:
+def network(kind: str, platform: Platform, seed: int = 0, **options) -> Any:
     """Of random weights, in float64, all of them different from their special starts."""
     torch.manual_seed(seed)
     model = build(kind, platform, Scaling.of(platform), **options).double()

@@ -181,5 +181,5 @@ def test_onnx_of_a_double_network_keeps_its_digits(legs):
 
     content = to_onnx(model, facts_of(model, tiny(), RECORD))
     session = onnxruntime.InferenceSession(content)
-    raw = session.run(None, {"legs": legs})[0]
+    raw = np.asarray(session.run(None, {"legs": legs})[0])
     np.testing.assert_allclose(raw, model.raw(torch.tensor(legs)).detach(), rtol=1e-9, atol=1e-10)

@@ -12,7 +12,7 @@ from gough.pose import wxyz_product
 
 def off_by(pose: Pose, shift: float, degrees: float) -> Pose:
     turn = Pose.from_rotation_vector(np.zeros(3), [0, np.radians(degrees), 0])
-    return Pose(pose.position + [shift, 0, 0], wxyz_product(pose.wxyz, turn.wxyz))
+    return Pose(pose.position + np.array([shift, 0, 0]), wxyz_product(pose.wxyz, turn.wxyz))
 
 
 @settings(max_examples=30)
@@ -60,8 +60,9 @@ def test_different_numbers_of_poses_are_refused():
 
 @pytest.mark.parametrize("name", ["reference", "reachy_mini", "rubin_camera", "linuxcnc_genhex"])
 def test_newton_ends_at_the_true_pose_from_nearby(name):
-    from gough import Platform
     from learn.machines import with_some_workspace
+
+    from gough import Platform
 
     platform = with_some_workspace(Platform.load(name))
     truth = platform.sample_poses(200, seed=1)

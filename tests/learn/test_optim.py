@@ -15,6 +15,7 @@ def stretched(optimiser_of, steps=300, lr=0.05):
     y = x @ torch.linalg.pinv(x) @ torch.randn(256, 3).double()
     model = nn.Linear(8, 3).double()
     optimiser = optimiser_of(model.parameters(), lr)
+    loss = torch.zeros(())
     for step in range(steps):
         for group in optimiser.param_groups:
             group["lr"] = lr * (1 - step / steps)

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gough.fk.network import nearest_rotations
-from gough.learn.loss import matrix_to_euler
 from gough.learn.geometry import euler_to_matrix
+from gough.learn.loss import matrix_to_euler
 from gough.learn.rotation import nearest_rotation
 
 
@@ -30,9 +30,13 @@ def test_both_forms_give_the_nearest_rotation(seed, noise):
 
 
 def test_mirrored_and_broken_matrices_still_give_rotations():
-    m = np.stack([np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3)), np.full((3, 3), np.nan), 1e6 * np.eye(3)])
+    m = np.stack(
+        [np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3)), np.full((3, 3), np.nan), 1e6 * np.eye(3)]
+    )
     R = nearest_rotations(m)
-    np.testing.assert_allclose(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12)
+    np.testing.assert_allclose(
+        R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12
+    )
     np.testing.assert_allclose(np.linalg.det(R), 1)
 
 

@@ -89,7 +89,7 @@ class NetworkSeed:
         legs = as_batch("legs", legs, (6,))
         flat = np.clip(legs.reshape(-1, 6), *self.leg_range.T)
         parts = [flat[i : i + CHUNK] for i in range(0, len(flat), CHUNK)]
-        raw = [self._session.run(None, {"legs": part})[0] for part in parts]
+        raw = [np.asarray(self._session.run(None, {"legs": part})[0]) for part in parts]
         outputs = np.concatenate(raw) if raw else np.zeros((0, 7))
         return self._decode(outputs.reshape(*legs.shape[:-1], outputs.shape[-1]))
 

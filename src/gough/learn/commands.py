@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import tyro
 from tyro.conf import Positional, arg
 
-from gough.learn.config import PRESETS, TrainConfig
+from gough.learn.config import PRESETS
 
 PlatformName = Annotated[
     str, arg(aliases=["-p"], metavar="PLATFORM", help="a machine of the catalog, or a .toml file.")
@@ -61,9 +61,7 @@ def dataset(
 
     spec = DatasetSpec(count, seed, same_assembly)
     machine = _platform(platform, workspace)
-    path = write_dataset(
-        machine, out, spec, layout=layout, rotation=rotation, processes=processes
-    )
+    path = write_dataset(machine, out, spec, layout=layout, rotation=rotation, processes=processes)
     print(f"{path}: {count:,} rows, the first {spec.train_rows:,} for training")
     return 0
 
@@ -71,7 +69,9 @@ def dataset(
 def train(
     *,
     platform: PlatformName,
-    out: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER", help="of the run.")] = Path("runs/mine"),
+    out: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER", help="of the run.")] = Path(
+        "runs/mine"
+    ),
     resume: bool = False,
     prepare: bool = False,
     budget: Annotated[str | None, arg(metavar="TIME", help_behavior_hint="")] = None,

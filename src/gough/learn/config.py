@@ -110,7 +110,9 @@ class TrainConfig:
     def __post_init__(self) -> None:
         given = [n for n in ("budget", "steps", "epochs") if getattr(self.run, n) is not None]
         if len(given) > 1:
-            raise GoughError(f"run: give one of budget, steps and epochs, not {' and '.join(given)}")
+            raise GoughError(
+                f"run: give one of budget, steps and epochs, not {' and '.join(given)}"
+            )
         if self.run.budget is not None:
             seconds(self.run.budget)
         if self.run.epochs is not None and self.data.samples is None:

@@ -13,7 +13,7 @@ import numpy as np
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.fk.network import NetworkSeed, shipped_names
-from gough.fk.seeds import HomeSeed, Seed
+from gough.fk.seeds import PoseSeed, Seed
 from gough.learn.dataset import DatasetSpec, dataset
 from gough.learn.metrics import THRESHOLDS, Metrics, measure
 from gough.learn.models.polynomial import PolynomialGuess
@@ -84,7 +84,7 @@ def _row(platform: Platform, name: str, truth: Pose, legs: Array, same_assembly:
 def _seed(platform: Platform, name: str, same_assembly: bool) -> tuple:
     """The first guess of a name; its parameters, training time and seed."""
     if name == "home":
-        return HomeSeed(platform), None, None, None
+        return PoseSeed(platform.home), None, None, None
     if name.startswith("polynomial-"):
         degree = name.removeprefix("polynomial-")
         if not degree.isdigit():

@@ -15,6 +15,17 @@ class TorchPlatform(nn.Module):
     base coordinates, and home's inverse rotation times the pose's own.
     """
 
+    base: Tensor
+    arms: Tensor
+    origin: Tensor
+    home_rotation: Tensor
+    home_lengths: Tensor
+    axis_x: Tensor
+    axis_y: Tensor
+    branch: Tensor
+    arm: Tensor
+    rod: Tensor
+
     def __init__(self, platform: Platform, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
         self.platform = platform
@@ -62,24 +73,17 @@ class TorchPlatform(nn.Module):
     def assembly_sign(self, shift: Tensor, turn: Tensor) -> Tensor:
         """Sign of det J times that at home, (...): see `gough.assembly_sign`."""
         sign = self._sign(shift, turn)
-        home = self._sign(torch.zeros_like(shift[..., :1, :]), self._identity(turn))
-        return sign * home
+        no_turn = torch.eye(3, dtype=turn.dtype, device=turn.device)
+        return sign * self._sign(torch.zeros_like(self.origin), no_turn)
 
     def _sign(self, shift: Tensor, turn: Tensor) -> Tensor:
         struts, arms = self.struts(shift, turn)
         rods = struts
-        scale = torch.ones_like(struts[..., 0])
         if self.platform.rotary is not None:
             angle = self._motor_angles(struts)[..., None]
             rods = struts - self.arm * (angle.cos() * self.axis_x + angle.sin() * self.axis_y)
-            slope = angle.cos() * self.axis_y - angle.sin() * self.axis_x
-            scale = (rods * slope).sum(-1)
         rows = torch.cat([rods, torch.linalg.cross(arms, rods)], dim=-1)  # (..., 6, 6)
-        del scale
         return torch.linalg.slogdet(rows / torch.linalg.vector_norm(rods, dim=-1, keepdim=True))[0]
-
-    def _identity(self, turn: Tensor) -> Tensor:
-        return torch.eye(3, dtype=turn.dtype, device=turn.device).expand(1, 3, 3)
 
 
 def euler_to_matrix(angles: Tensor) -> Tensor:

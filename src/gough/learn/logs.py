@@ -8,7 +8,17 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-COLUMNS = ("step", "seconds", "samples", "samples_per_second", "lr", "loss", "trans", "rot_deg", "ik")
+COLUMNS = (
+    "step",
+    "seconds",
+    "samples",
+    "samples_per_second",
+    "lr",
+    "loss",
+    "trans",
+    "rot_deg",
+    "ik",
+)
 
 
 class MetricsFile:
@@ -16,7 +26,7 @@ class MetricsFile:
 
     def __init__(self, path: Path, last_step: int) -> None:
         self.path = path
-        rows = []
+        rows: list[dict] = []
         if path.exists():
             with path.open(newline="") as file:
                 rows = [r for r in csv.DictReader(file) if _step(r) <= last_step]
@@ -67,7 +77,11 @@ class Bar:
 
     def __init__(self, unit: str, show: bool) -> None:
         self._unit = unit
-        columns = (BarColumn(), TextColumn("{task.percentage:5.1f} %"), TextColumn("{task.fields[text]}"))
+        columns = (
+            BarColumn(),
+            TextColumn("{task.percentage:5.1f} %"),
+            TextColumn("{task.fields[text]}"),
+        )
         self._progress = Progress(*columns, console=Console(stderr=True), disable=not show)
         self._task = self._progress.add_task("train", total=1.0, text="")
         self._progress.start()
@@ -75,8 +89,9 @@ class Bar:
     def update(self, progress: float, row: dict[str, float], remaining: float) -> None:
         """Show the last measurement."""
         text = (
-            f"loss {row['loss']:.4g}  t {row['trans']:.4g} {self._unit}  R {row['rot_deg']:.4g} deg  "
-            f"{row['samples_per_second']:,.0f}/s  {clock(remaining)} left"
+            f"loss {row['loss']:.4g}  t {row['trans']:.4g} {self._unit}  "
+            f"R {row['rot_deg']:.4g} deg  {row['samples_per_second']:,.0f}/s  "
+            f"{clock(remaining)} left"
         )
         self._progress.update(self._task, completed=progress, text=text)
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from gough.checks import Array
@@ -45,13 +47,13 @@ def outcome(platform: Platform, guess: Pose, truth: Pose, legs: Array) -> Outcom
         pose, converged = refine(platform, guess[part], legs[part])
         away, angle = pose.distance(truth[part])
         same = (away <= SAME * platform.size) & (angle <= SAME)
-        true += int((converged & same).sum())
-        other += int((converged & ~same).sum())
+        true += int(np.sum(converged & same))
+        other += int(np.sum(converged & ~same))
     return Outcome(len(legs), true, other, len(legs) - true - other)
 
 
 @torch.no_grad()
-def refine(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, Array]:
+def refine(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, NDArray[np.bool_]]:
     """Newton steps from guesses (N,): poses, and which rows (N,) converged within 30 steps.
 
     A step moves by (v, w): t + v and exp(w) R. Its rows are n_i . v + (R p_i x n_i) . w.

@@ -26,12 +26,12 @@ class SOAP(Optimizer):
 
     def __init__(self, params, lr=2e-3, betas=(0.95, 0.99), shampoo_beta=0.99, eps=1e-10,
                  weight_decay=0.0, refresh=10, largest=1024) -> None:  # fmt: skip
-        options = dict(lr=lr, betas=betas, shampoo_beta=shampoo_beta, eps=eps)
-        options |= dict(weight_decay=weight_decay, refresh=refresh, largest=largest)
+        options = {"lr": lr, "betas": betas, "shampoo_beta": shampoo_beta, "eps": eps}
+        options |= {"weight_decay": weight_decay, "refresh": refresh, "largest": largest}
         super().__init__(params, options)
 
     @torch.no_grad()
-    def step(self, closure=None):
+    def step(self, closure=None):  # pyright: ignore[reportIncompatibleMethodOverride]
         loss = None
         if closure is not None:
             with torch.enable_grad():

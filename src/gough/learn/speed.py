@@ -64,7 +64,7 @@ def measure_speed(platform: Platform, batch: int = 1000, repeats: int = 5) -> Sp
             with torch.no_grad():
                 model(stream.batch(batch, 0).legs)
 
-        def step(model=model, stream=stream, optimiser=optimiser) -> None:
+        def step(model=model, stream=stream, optimiser=optimiser, beta=beta) -> None:
             samples = stream.batch(batch, 0)
             optimiser.zero_grad()
             training_loss(model, samples.legs, samples, beta).backward()

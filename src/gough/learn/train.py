@@ -109,9 +109,7 @@ class Trainer:
         self.model.cast(getattr(torch, config.run.dtype))
         self.optimiser = _optimiser(config, self.model)
         self.average = self._weights() if config.optimiser.average else {}
-        self.stream = Stream(
-            platform, same_assembly=config.data.same_assembly, device=self.device
-        )
+        self.stream = Stream(platform, same_assembly=config.data.same_assembly, device=self.device)
         seed = config.run.seed
         self.test = self.stream.batch(config.data.test, seed, TEST)
         self.fixed = None
@@ -145,7 +143,8 @@ class Trainer:
             if self.clock.elapsed - logged >= self.config.run.log_every or progress >= 1:
                 logged = self.clock.elapsed
                 row = self.measure(float(loss), progress)
-                assert metrics is not None and board is not None
+                assert metrics is not None
+                assert board is not None
                 metrics.add(row)
                 board.add(row)
                 bar.update(progress, row, self.clock.remaining(self.step))
@@ -174,7 +173,8 @@ class Trainer:
         decay = self.config.optimiser.average
         if decay:
             values = [p.detach() for p in self.model.parameters()]
-            torch._foreach_lerp_(list(self.average.values()), values, 1 - decay)
+            for kept, value in zip(self.average.values(), values, strict=True):
+                kept.lerp_(value, 1 - decay)
         return self.team.mean(loss.detach())
 
     def samples(self, step: int) -> Batch:

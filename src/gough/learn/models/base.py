@@ -101,6 +101,11 @@ class PoseNetwork(nn.Module):
 
     kind: ClassVar[str]
     rotation: ClassVar[Rotation] = "nine"
+    leg_mean: Tensor
+    leg_std: Tensor
+    shift_mean: Tensor
+    shift_scale: Tensor
+    turn_scale: Tensor
 
     def __init__(self, platform: Platform, scaling: Scaling) -> None:
         super().__init__()

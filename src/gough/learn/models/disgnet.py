@@ -49,6 +49,8 @@ class DisGNet(GraphNetwork):
     """
 
     kind = "disgnet"
+    range_middle: Tensor
+    range_half: Tensor
 
     def __init__(self, platform: Platform, scaling: Scaling, *, width: int = 96, initial: int = 3,
                  head: int = 2, embedding: int = 8, bumps: int = 32, table: int = 64,
@@ -58,7 +60,9 @@ class DisGNet(GraphNetwork):
         spread = scaling.leg_std[:, None]
         low, high = ((scaling.leg_range - scaling.leg_mean[:, None]) / spread).T
         self.register_buffer("range_middle", torch.tensor((low + high) / 2), persistent=False)
-        self.register_buffer("range_half", torch.tensor(BEYOND * (high - low) / 2), persistent=False)
+        self.register_buffer(
+            "range_half", torch.tensor(BEYOND * (high - low) / 2), persistent=False
+        )
         self.embed = nn.Embedding(NODES, embedding)
         self.basis = RadialBasis(bumps)
         self.node_first = dense_stack(embedding, width, initial)

@@ -21,6 +21,7 @@ class GCN(GraphNetwork):
     """
 
     kind = "gcn"
+    spread: Tensor
 
     def __init__(self, platform: Platform, scaling: Scaling, *, width: int = 112,
                  layers: int = 9, head: int = 1) -> None:  # fmt: skip

@@ -13,6 +13,10 @@ from gough.platform import Platform
 class GraphNetwork(PoseNetwork):
     """Adds the graph: distances are divided by the largest that occurs in the workspace."""
 
+    edge_offset: Tensor
+    edge_gain: Tensor
+    ring_matrix: Tensor
+
     def __init__(self, platform: Platform, scaling: Scaling) -> None:
         super().__init__(platform, scaling)
         self.graph = HexapodGraph.of(platform)
@@ -24,9 +28,7 @@ class GraphNetwork(PoseNetwork):
         facts = {"edge_offset": at_zero / largest, "edge_gain": (at_one - at_zero) / largest}
         facts |= {"ring_matrix": self.graph.constant / largest}
         for name, value in facts.items():
-            self.register_buffer(
-                name, torch.tensor(value, dtype=torch.float64), persistent=False
-            )
+            self.register_buffer(name, torch.tensor(value, dtype=torch.float64), persistent=False)
 
     def edges(self, x: Tensor) -> Tensor:
         """Scaled lengths (N, 6) of the legs' edges for normalised readings (N, 6)."""

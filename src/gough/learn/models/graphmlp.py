@@ -19,6 +19,7 @@ class GraphMLP(GraphNetwork):
     """Blocks of width `width`; the nodes' mean is read out."""
 
     kind = "graphmlp"
+    spread: Tensor
 
     def __init__(self, platform: Platform, scaling: Scaling, *, width: int = 144,
                  blocks: int = 3, hidden: int = 328) -> None:  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import torch
 from torch import Tensor, nn
 
@@ -23,9 +25,7 @@ class Dense(nn.Module):
 def dense_stack(inputs: int, width: int, layers: int, *, norm: bool = True) -> nn.Sequential:
     """`layers` dense layers from `inputs` to `width` and on at that width."""
     sizes = [inputs] + [width] * layers
-    return nn.Sequential(
-        *(Dense(a, b, norm=norm) for a, b in zip(sizes[:-1], sizes[1:], strict=True))
-    )
+    return nn.Sequential(*(Dense(a, b, norm=norm) for a, b in pairwise(sizes)))
 
 
 class RadialBasis(nn.Module):
@@ -35,6 +35,8 @@ class RadialBasis(nn.Module):
         count: number of Gaussians.
         largest: distance of the last centre; the first is 0.
     """
+
+    centres: Tensor
 
     def __init__(self, count: int, largest: float = 1.05) -> None:
         super().__init__()
