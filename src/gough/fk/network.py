@@ -90,7 +90,8 @@ class NetworkSeed:
         flat = np.clip(legs.reshape(-1, 6), *self.leg_range.T)
         parts = [flat[i : i + CHUNK] for i in range(0, len(flat), CHUNK)]
         raw = [np.asarray(self._session.run(None, {"legs": part})[0]) for part in parts]
-        outputs = np.concatenate(raw) if raw else np.zeros((0, 7))
+        width = self._session.get_outputs()[0].shape[1]
+        outputs = np.concatenate([*raw, np.zeros((0, width))])
         return self._decode(outputs.reshape(*legs.shape[:-1], outputs.shape[-1]))
 
     def outside(self, legs: Array) -> NDArray[np.bool_]:

@@ -16,6 +16,9 @@ from gough.platform import Platform
 class GCN(GraphNetwork):
     """Every node starts with its row of the distance matrix and its number.
 
+    In the matrix the legs' entries are standardised and the rings' scaled: as plain lengths,
+    whose differences are small, the legs are learned far more slowly.
+
     A layer averages over the neighbours, D^-1/2 (A + I) D^-1/2 (Kipf and Welling, 2017), then
     applies a residual dense layer. The nodes' mean is read out.
     """
@@ -34,7 +37,7 @@ class GCN(GraphNetwork):
         self.start_near_home(self.last)
 
     def network(self, x: Tensor) -> Tensor:
-        h = self.first(node_features(self.matrix(self.edges(x))))  # (N, 12, width)
+        h = self.first(node_features(self.matrix(x)))  # (N, 12, width)
         spread = self.spread.to(h.dtype)
         for layer in self.layers:
             h = layer(spread @ h)

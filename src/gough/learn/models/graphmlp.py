@@ -32,7 +32,7 @@ class GraphMLP(GraphNetwork):
         self.start_near_home(self.last)
 
     def network(self, x: Tensor) -> Tensor:
-        h = self.first(node_features(self.matrix(self.edges(x))))  # (N, 12, width)
+        h = self.first(node_features(self.matrix(x)))  # (N, 12, width)
         for block in self.blocks:
             h = block(h, self.spread.to(h.dtype))
         return self.last(self.norm(h.mean(1)))

@@ -60,6 +60,7 @@ class Standardise(nn.Module):
     @torch.no_grad()
     def start(self, x: Tensor) -> None:
         """Fit gain and bias to samples (N, width)."""
+        x = x.detach()
         spread = x.std(0) + 1e-6 * x.abs().mean()
         self.gain.copy_(1 / spread)
         self.bias.copy_(-x.mean(0) / spread)
