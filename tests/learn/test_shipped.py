@@ -7,6 +7,7 @@ from learn.machines import reference
 from gough import GoughError, Platform, leg_lengths
 from gough.fk.network import NetworkSeed, shipped_names
 from gough.learn.evaluate import HELD_OUT, default_names, evaluate, held_out, table, to_json
+from gough.learn.speed import measure_speed
 
 
 def test_names():
@@ -67,3 +68,14 @@ def test_names_that_stand_for_nothing():
         evaluate(reference(), ["polynomial-x"], poses=10)
     with pytest.raises(GoughError, match="no network 'nonsense'"):
         evaluate(reference(), ["nonsense"], poses=10)
+    with pytest.raises(GoughError, match="no such run's folder"):
+        evaluate(reference(), ["runs/none"], poses=10)
+
+
+def test_the_structured_form_is_much_faster_than_the_dense_one():
+    speed = measure_speed(reference(), batch=100, repeats=1)
+    assert speed.structured.run < speed.dense.run / 5  # 30 to 150 where nothing else runs
+    assert speed.tables.train < speed.dense.train / 5
+    lines = speed.lines()
+    assert len(lines) == 6
+    assert "times dense" in lines[1]

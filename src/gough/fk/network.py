@@ -221,6 +221,19 @@ def _shipped_files() -> list:
     return sorted((f for f in files.iterdir() if f.name.endswith(".onnx")), key=lambda f: f.name)
 
 
+def find_network(platform: Platform, name: str | Path) -> NetworkSeed:
+    """A network by the name of one that comes with the package, or the path of a run or file.
+
+    Raises:
+        GoughError: there is none, or it is damaged or of another platform.
+    """
+    if Path(name).exists():
+        return NetworkSeed(platform, name)
+    if Path(name).suffix or len(Path(name).parts) > 1:
+        raise GoughError(f"{name}: no such run's folder or .onnx file")
+    return NetworkSeed.shipped(platform, str(name))
+
+
 def shipped_names(platform: Platform) -> list[str]:
     """Networks that come with the package for a platform, as it is now."""
     return sorted(facts["kind"] for _, facts in _shipped(platform))

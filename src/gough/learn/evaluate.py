@@ -12,7 +12,7 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk.network import NetworkSeed, shipped_names
+from gough.fk.network import find_network, shipped_names
 from gough.fk.seeds import PoseSeed, Seed
 from gough.learn.dataset import DatasetSpec, dataset
 from gough.learn.metrics import THRESHOLDS, Metrics, measure
@@ -91,8 +91,7 @@ def _seed(platform: Platform, name: str, same_assembly: bool) -> tuple:
             raise GoughError(f"{name}: expected a degree, such as polynomial-5")
         fitted = PolynomialGuess(platform, int(degree), same_assembly=same_assembly)
         return fitted, fitted.parameters, fitted.seconds, 0
-    is_file = Path(name).exists()
-    seed = NetworkSeed(platform, name) if is_file else NetworkSeed.shipped(platform, name)
+    seed = find_network(platform, name)
     record = seed.facts["record"]
     return seed, seed.facts["parameters"], record["seconds"], record["seed"]
 
