@@ -31,11 +31,11 @@ _HOMES = {
     "pose_covariance": "gough.kinematics",
     "singularity_distance": "gough.kinematics",
     "AssemblyModes": "gough.modes.result",
-    "Certificate": "gough.modes.certificate",
+    "Certificate": "gough.fk.certificate",
     "Choice": "gough.modes.choose",
     "ModesStatus": "gough.modes.result",
     "assembly_modes": "gough.modes.assembly",
-    "certify": "gough.modes.certificate",
+    "certify": "gough.fk.certificate",
     "choose_mode": "gough.modes.choose",
 }
 
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
         singularity_distance,
     )
     from gough.modes.assembly import assembly_modes
-    from gough.modes.certificate import Certificate, certify
+    from gough.fk.certificate import Certificate, certify
     from gough.modes.choose import Choice, choose_mode
     from gough.modes.result import AssemblyModes, ModesStatus
     from gough.platform import Platform

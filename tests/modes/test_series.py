@@ -10,7 +10,7 @@ import gough
 from gough.fk.jit import jit
 from gough.modes.finish import repeated
 from gough.modes.follow import Parameters, follow
-from gough.modes.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
+from gough.fk.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
 from gough.modes.monodromy import gaussian
 from gough.modes.series import (
     BASE,

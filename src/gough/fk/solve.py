@@ -25,6 +25,7 @@ def solve(
     restarts: int = 24,
     singular: float = geometry.SINGULAR,
     leg_noise: ArrayLike | None = None,
+    certify: bool = False,
     workers: int | None = None,
 ) -> Solution:
     """Poses that have the given leg readings, each with what is known about it.
@@ -47,6 +48,8 @@ def solve(
             reported as near one.
         leg_noise: standard deviation of the readings, a number or (6,), or their covariance
             (6, 6): asks for `Solution.covariance`.
+        certify: prove each usable pose: where it succeeds, CONVERGED becomes CERTIFIED and
+            `Solution.radius` says how far around no other pose has these legs.
         workers: threads; all cores unless given.
 
     Returns:
@@ -66,7 +69,8 @@ def solve(
         # a given pose says which assembly mode is meant: where Newton went from it stands
         _finish(platform, flat, rows, start, isinstance(found, PoseSeed), settings)
         _blank_invalid(rows)
-    return _solution(platform, rows, readings.shape[:-1], leg_noise)
+    radius = _certify(platform, flat, rows, settings) if certify else None
+    return _solution(platform, rows, radius, readings.shape[:-1], leg_noise)
 
 
 def _start(platform: Platform, seed: Seed, legs: Array) -> Array | Polynomial:
@@ -112,8 +116,32 @@ def _finish(
         bulk.rescue(platform, legs, rows, chosen[part], guess[part], others, settings)
 
 
+def _certify(
+    platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Settings
+) -> Array:
+    """Radii of uniqueness (N,) [platform unit], 0 where unproven; promotes converged rows."""
+    from gough.fk.certificate import certify
+
+    radius = np.zeros(len(legs))
+
+    def work(first: int, last: int) -> int:
+        part = slice(first, last)
+        pose = Pose.trusted(rows.position[part], rows.wxyz[part])
+        radius[part] = certify(platform, legs[part], pose).radius
+        return 0
+
+    bulk.share_out(work, len(legs), settings.workers)
+    proven = radius > 0
+    rows.status[proven & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
+    return radius
+
+
 def _solution(
-    platform: Platform, rows: bulk.Rows, batch: tuple[int, ...], leg_noise: ArrayLike | None
+    platform: Platform,
+    rows: bulk.Rows,
+    radius: Array | None,
+    batch: tuple[int, ...],
+    leg_noise: ArrayLike | None,
 ) -> Solution:
     pose = Pose.trusted(rows.position.reshape(*batch, 3), rows.wxyz.reshape(*batch, 4))
     return Solution(
@@ -122,6 +150,7 @@ def _solution(
         rows.residual.reshape(batch),
         rows.iterations.reshape(batch),
         None if leg_noise is None else pose_covariance(platform, pose, leg_noise),
+        None if radius is None else radius.reshape(batch),
     )
 
 

@@ -23,6 +23,7 @@ class Status(IntEnum):
     UNREACHABLE = 4
     NOT_CONVERGED = 5
     INVALID_INPUT = 6
+    CERTIFIED = 7
 
     @property
     def text(self) -> str:
@@ -40,7 +41,9 @@ class Status(IntEnum):
         return self in USABLE
 
 
-USABLE = (Status.CONVERGED, Status.OUTSIDE_STROKE, Status.NEAR_SINGULARITY)
+USABLE = (
+    Status.CONVERGED, Status.OUTSIDE_STROKE, Status.NEAR_SINGULARITY, Status.CERTIFIED,
+)  # fmt: skip
 
 _TEXTS = {
     Status.CONVERGED: "The pose has these leg readings to within the tolerance.",
@@ -68,6 +71,10 @@ _TEXTS = {
     Status.INVALID_INPUT: (
         "A reading is not a finite number, or a length is not above zero: correct the row."
     ),
+    Status.CERTIFIED: (
+        "Proven: exactly one pose with these leg readings lies within the stated radius of this "
+        "one."
+    ),
 }
 
 
@@ -82,6 +89,8 @@ class Solution:
             that its reading asks for [platform unit]; NaN where the input was invalid.
         iterations: (...) int32, Newton steps taken, over all starts that were tried.
         covariance: (..., 6, 6) pose covariance, see `gough.pose_covariance`, or None.
+        radius: (...) radius of uniqueness [platform unit], see `gough.Certificate`, 0 where
+            nothing is proven; None unless certificates were asked for.
     """
 
     pose: Pose
@@ -89,6 +98,7 @@ class Solution:
     residual: Array
     iterations: NDArray[np.int32]
     covariance: Array | None = None
+    radius: Array | None = None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -104,9 +114,10 @@ class Solution:
         if isinstance(self.status, Status):
             raise IndexError("the solution of a single row has no rows")
         covariance = None if self.covariance is None else self.covariance[index]
+        radius = None if self.radius is None else self.radius[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
-            covariance,
+            covariance, radius,
         )  # fmt: skip
 
     def __repr__(self) -> str:

@@ -17,7 +17,7 @@ from gough.kinematics import (
     joint_positions,
     singularity_distance,
 )
-from gough.modes.certificate import Certificate
+from gough.fk.certificate import Certificate
 from gough.platform import Platform
 from gough.pose import Pose
 
