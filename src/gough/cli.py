@@ -74,14 +74,15 @@ def _dispatch(arguments: list[str]) -> int:
         raise GoughError(f"no command {command!r}{near} commands are {', '.join(COMMANDS)}")
     import tyro
 
-    run = import_module(f"gough.commands.{command}").run
+    module, function, _ = COMMANDS[command]
+    run = getattr(import_module(module), function)
     # flags are --flag alone, without a --no-flag beside it
     config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes)
     return tyro.cli(run, prog=f"gough {command}", args=rest, config=config)
 
 
 def _help() -> str:
-    lines = [f"  {name:<11} {text}" for name, text in COMMANDS.items()]
+    lines = [f"  {name:<11} {text}" for name, (_, _, text) in COMMANDS.items()]
     return "\n".join(
         [
             "usage: gough COMMAND [OPTIONS]",

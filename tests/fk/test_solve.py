@@ -482,3 +482,52 @@ def test_solutions_can_be_read():
     assert repr(solution[0]).startswith("Solution(converged, Pose(position=(")
     assert len(solution[:2].pose) == 2
     np.testing.assert_array_equal(solution.usable, [True, True, False, True])
+
+
+# ---- certificates ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_proven_poses_are_the_true_ones(name):
+    platform = gough.Platform.load(name)
+    pose, legs = _legs(platform, 2_000)
+    solution = gough.solve(platform, legs, certify=True)
+    assert solution.radius is not None
+    proven = solution.radius > 0
+    assert np.mean(proven) > 0.999
+    assert np.all(solution.usable)
+    converged = gough.solve(platform, legs).status == Status.CONVERGED
+    np.testing.assert_array_equal(solution.status == Status.CERTIFIED, converged & proven)
+    assert solution.pose.distance(pose)[0][proven].max() < 1e-10 * platform.size
+
+
+def test_what_has_no_pose_is_not_certified():
+    platform = gough.Platform.load("reference")
+    _, legs = _legs(platform, 6)
+    legs[1], legs[3] = np.nan, legs[3] + np.array([0, 0, 0, 0, 0, 400.0])
+    solution = gough.solve(platform, legs, certify=True)
+    assert solution.radius is not None
+    np.testing.assert_array_equal(solution.radius > 0, [True, False, True, False, True, True])
+    np.testing.assert_array_equal(solution.status[[1, 3]], [6, 4])
+    loose = gough.solve(platform, legs[0] + 5, tol=1e-2, certify=True)
+    assert loose.residual > 0 or loose.status == Status.CERTIFIED
+    assert gough.solve(platform, legs[0], certify=True).status == Status.CERTIFIED
+    assert gough.solve(platform, legs[0]).radius is None
+
+
+# ---- networks -------------------------------------------------------------------------
+
+
+def test_the_papers_two_stages():
+    platform = gough.Platform.load("reference")
+    pose, legs = _legs(platform, 2_000)
+    legs[5] = np.nan
+    solution = gough.solve(platform, legs, seed="disgnet")
+    good = np.arange(2_000) != 5
+    assert np.all(solution.status[good] == Status.CONVERGED)
+    assert solution.pose.distance(pose)[0][good].max() < 1e-9
+    assert solution.status[5] == Status.INVALID_INPUT
+    with pytest.raises(gough.GoughError, match="platform 'rubin_camera' as it is now"):
+        gough.solve(gough.Platform.load("rubin_camera"), np.zeros(6), seed="disgnet")
+    with pytest.raises(gough.GoughError, match="runs/none: no such run's folder"):
+        gough.solve(platform, legs, seed="runs/none")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
@@ -19,12 +19,18 @@ from gough.commands.options import (
 )
 
 
+if TYPE_CHECKING:
+    from gough.platform import Platform
+
+PREFERRED = "disgnet"
+
+
 def run(
     legs: Annotated[Positional[str], arg(metavar="LEGS")],
     *,
     platform: PlatformName,
     out: Out = None,
-    seed: Annotated[str, arg(metavar="NAME")] = "auto",
+    seed: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
     tolerance: Annotated[float | None, arg(metavar="T", help_behavior_hint="")] = None,
     max_iterations: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     leg_noise: Annotated[float | None, arg(metavar="S", help_behavior_hint="")] = None,
@@ -48,7 +54,10 @@ def run(
 
     Args:
         legs: .csv or .parquet with columns leg_1 to leg_6, or - for CSV on standard input.
-        seed: the first guess: auto, home, polynomial, or a network.
+        seed: the first guess: home, polynomial, polynomial-5, the name of a network that comes
+            with gough, or the folder of a trained one. Without it: the network that comes with
+            gough for this platform (reference: disgnet); if none does, polynomial where the
+            platform states a workspace, else home.
         tolerance: largest leg error of a converged row, as a share of the platform's size.
         max_iterations: Newton steps before a row is given up; 0 writes the first guess.
         leg_noise: standard deviation of the readings, in their unit; adds six columns with
@@ -60,7 +69,11 @@ def run(
     from gough.platform import Platform
 
     machine = Platform.load(platform)
-    solver = {"seed": seed, "tol": tolerance, "max_iterations": max_iterations}
+    solver = {
+        "seed": seed or default_seed(machine),
+        "tol": tolerance,
+        "max_iterations": max_iterations,
+    }
     given = {name: value for name, value in solver.items() if value is not None}
     with show.progress_bar() as progress:
         report = solve_file(
@@ -74,3 +87,10 @@ def run(
     show.print_invalid(report, legs)
     show.print_summary(report, machine, out, screen)
     return 1 if report.failures and not allow_failures else 0
+
+
+def default_seed(machine: Platform) -> str:
+    """The network that comes with the package for a machine, or what `solve` takes by itself."""
+    from gough.fk.network import shipped_names
+
+    return PREFERRED if PREFERRED in shipped_names(machine) else "auto"

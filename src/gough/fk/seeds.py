@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -110,15 +111,40 @@ def find_seed(platform: Platform, seed: str | Seed | Pose) -> Seed:
     return seed
 
 
-@lru_cache(maxsize=64)
 def _named(platform: Platform, name: str) -> Seed:
-    if name == "auto":
-        return PolynomialSeed(platform, DEGREE if platform.workspace else 0)
-    if name == "home":
-        return PolynomialSeed(platform, 0)
     kind, _, degree = name.partition("-")
+    if name == "auto":
+        return _polynomial(platform, DEGREE if platform.workspace else 0)
+    if name == "home":
+        return _polynomial(platform, 0)
     if kind == "polynomial" and (degree == "" or degree.isdecimal()):
-        return PolynomialSeed(platform, int(degree or DEGREE))
+        return _polynomial(platform, int(degree or DEGREE))
+    return _network(platform, name)
+
+
+def _network(platform: Platform, name: str) -> Seed:
+    """A trained network, by path or by the name of one that comes with the package."""
+    from gough.fk.network import find_network, shipped_names
+
+    ours = shipped_names(platform)
+    if name in ours:
+        return _shipped(platform, name)
+    if Path(name).exists() or Path(name).suffix or len(Path(name).parts) > 1:
+        return find_network(platform, name)
     raise GoughError(
-        f"seed: unknown name {name!r}; expected auto, home, polynomial or polynomial-DEGREE"
+        f"seed: unknown name {name!r}; expected auto, home, polynomial, polynomial-DEGREE, the path "
+        f"of a trained network, or one that comes with gough for platform {platform.name!r} as it "
+        f"is now ({', '.join(ours) or 'there is none: see gough train'})"
     )
+
+
+@lru_cache(maxsize=64)
+def _polynomial(platform: Platform, degree: int) -> Seed:
+    return PolynomialSeed(platform, degree)
+
+
+@lru_cache(maxsize=8)
+def _shipped(platform: Platform, name: str) -> Seed:
+    from gough.fk.network import NetworkSeed
+
+    return NetworkSeed.shipped(platform, name)

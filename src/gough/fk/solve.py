@@ -37,8 +37,9 @@ def solve(
         legs: readings (..., 6): lengths, length changes [platform unit] or motor angles [rad].
             Rows that hold NaN or impossible numbers get status INVALID_INPUT.
         seed: the first guess. "auto" (polynomial where the platform states a workspace, else
-            home), "home", "polynomial", "polynomial-5" (another degree), a `Pose` (one, or one
-            a row), or any object with `guess(legs) -> Pose`.
+            home), "home", "polynomial", "polynomial-5" (another degree), "disgnet" or another
+            network that comes with the package, the path of a trained one or of its run's
+            folder, a `Pose` (one, or one a row), or any object with `guess(legs) -> Pose`.
         tol: largest strut length error of a converged row, as a share of the platform's size
             (rounding alone leaves about 2e-15).
         max_iterations: Newton steps from each start; 0 returns the guess itself.
@@ -116,9 +117,7 @@ def _finish(
         bulk.rescue(platform, legs, rows, chosen[part], guess[part], others, settings)
 
 
-def _certify(
-    platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Settings
-) -> Array:
+def _certify(platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Settings) -> Array:
     """Radii of uniqueness (N,) [platform unit], 0 where unproven; promotes converged rows."""
     from gough.fk.certificate import certify
 
