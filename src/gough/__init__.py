@@ -43,6 +43,7 @@ __all__ = ["__version__", *sorted(_HOMES)]  # pyright: ignore[reportUnsupportedD
 
 if TYPE_CHECKING:
     from gough.errors import GoughError, InputError, PlatformError
+    from gough.fk.certificate import Certificate, certify
     from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed
     from gough.fk.solve import solve
     from gough.fk.status import Solution, Status
@@ -56,7 +57,6 @@ if TYPE_CHECKING:
         singularity_distance,
     )
     from gough.modes.assembly import assembly_modes
-    from gough.fk.certificate import Certificate, certify
     from gough.modes.choose import Choice, choose_mode
     from gough.modes.result import AssemblyModes, ModesStatus
     from gough.platform import Platform

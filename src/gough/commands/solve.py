@@ -18,7 +18,6 @@ from gough.commands.options import (
     reading_options,
 )
 
-
 if TYPE_CHECKING:
     from gough.platform import Platform
 

@@ -132,8 +132,8 @@ def _network(platform: Platform, name: str) -> Seed:
     if Path(name).exists() or Path(name).suffix or len(Path(name).parts) > 1:
         return find_network(platform, name)
     raise GoughError(
-        f"seed: unknown name {name!r}; expected auto, home, polynomial, polynomial-DEGREE, the path "
-        f"of a trained network, or one that comes with gough for platform {platform.name!r} as it "
+        f"seed: unknown name {name!r}; expected auto, home, polynomial, polynomial-DEGREE, "
+        f"the path of a trained network, or one that comes with gough for platform {platform.name!r} as it "
         f"is now ({', '.join(ours) or 'there is none: see gough train'})"
     )
 
