@@ -16,6 +16,7 @@ _HOMES = {
     "GoughError": "gough.errors",
     "InputError": "gough.errors",
     "PlatformError": "gough.errors",
+    "NetworkSeed": "gough.fk.network",
     "PolynomialSeed": "gough.fk.seeds",
     "PoseSeed": "gough.fk.seeds",
     "Seed": "gough.fk.seeds",
@@ -44,6 +45,7 @@ __all__ = ["__version__", *sorted(_HOMES)]  # pyright: ignore[reportUnsupportedD
 if TYPE_CHECKING:
     from gough.errors import GoughError, InputError, PlatformError
     from gough.fk.certificate import Certificate, certify
+    from gough.fk.network import NetworkSeed
     from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed
     from gough.fk.solve import solve
     from gough.fk.status import Solution, Status

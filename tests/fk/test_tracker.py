@@ -70,6 +70,22 @@ def test_a_bad_reading_is_held_and_forgotten(reference, bad, status):
     assert found.distance(pose[51])[0] < 1e-9
 
 
+def test_a_missed_cycle_allows_for_two_and_then_no_more(reference):
+    home = reference.home.position
+    tracker = gough.Tracker(reference, start=reference.home, max_shift=4.0)
+
+    def go(x):
+        tracker.update(gough.leg_lengths(reference, gough.Pose(home + np.array([x, 0, 0]))))
+        return tracker.event
+
+    assert go(3.0) == Event.FOLLOWED
+    tracker.update([np.nan] * 6)
+    assert go(9.0) == Event.FOLLOWED  # 6 in two cycles
+    assert go(15.0) == Event.JUMPED  # 6 in one
+    assert go(12.0) == Event.FOLLOWED
+    assert go(18.0) == Event.JUMPED
+
+
 def test_a_jump_is_doubted_then_taken(reference):
     pose, legs = _path(reference)
     tracker = gough.Tracker(reference, confirm=3)

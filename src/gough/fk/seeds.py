@@ -132,9 +132,9 @@ def _network(platform: Platform, name: str) -> Seed:
     if Path(name).exists() or Path(name).suffix or len(Path(name).parts) > 1:
         return find_network(platform, name)
     raise GoughError(
-        f"seed: unknown name {name!r}; expected auto, home, polynomial, polynomial-DEGREE, "
-        f"the path of a trained network, or one that comes with gough for platform {platform.name!r} as it "
-        f"is now ({', '.join(ours) or 'there is none: see gough train'})"
+        f"seed: unknown name {name!r}; expected auto, home, polynomial, polynomial-DEGREE, the "
+        f"path of a trained network, or one that comes with gough for platform {platform.name!r} "
+        f"as it is now ({', '.join(ours) or 'there is none: see gough train'})"
     )
 
 
