@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import gough
+from gough.fk.certificate import certify_batch
 from gough.modes.assembly import usable_cores
-from gough.modes.certificate import certify_batch
 from gough.modes.starts import find_start, start_of
 
 MACHINES = (

@@ -16,6 +16,15 @@ _HOMES = {
     "GoughError": "gough.errors",
     "InputError": "gough.errors",
     "PlatformError": "gough.errors",
+    "NetworkSeed": "gough.fk.network",
+    "PolynomialSeed": "gough.fk.seeds",
+    "PoseSeed": "gough.fk.seeds",
+    "Seed": "gough.fk.seeds",
+    "Event": "gough.fk.tracker",
+    "Solution": "gough.fk.status",
+    "Status": "gough.fk.status",
+    "Tracker": "gough.fk.tracker",
+    "solve": "gough.fk.solve",
     "assembly_sign": "gough.kinematics",
     "jacobian": "gough.kinematics",
     "joint_positions": "gough.kinematics",
@@ -23,11 +32,11 @@ _HOMES = {
     "pose_covariance": "gough.kinematics",
     "singularity_distance": "gough.kinematics",
     "AssemblyModes": "gough.modes.result",
-    "Certificate": "gough.modes.certificate",
+    "Certificate": "gough.fk.certificate",
     "Choice": "gough.modes.choose",
     "ModesStatus": "gough.modes.result",
     "assembly_modes": "gough.modes.assembly",
-    "certify": "gough.modes.certificate",
+    "certify": "gough.fk.certificate",
     "choose_mode": "gough.modes.choose",
 }
 
@@ -35,6 +44,12 @@ __all__ = ["__version__", *sorted(_HOMES)]  # pyright: ignore[reportUnsupportedD
 
 if TYPE_CHECKING:
     from gough.errors import GoughError, InputError, PlatformError
+    from gough.fk.certificate import Certificate, certify
+    from gough.fk.network import NetworkSeed
+    from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed
+    from gough.fk.solve import solve
+    from gough.fk.status import Solution, Status
+    from gough.fk.tracker import Event, Tracker
     from gough.kinematics import (
         assembly_sign,
         jacobian,
@@ -44,7 +59,6 @@ if TYPE_CHECKING:
         singularity_distance,
     )
     from gough.modes.assembly import assembly_modes
-    from gough.modes.certificate import Certificate, certify
     from gough.modes.choose import Choice, choose_mode
     from gough.modes.result import AssemblyModes, ModesStatus
     from gough.platform import Platform

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import reprlib
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gough.errors import GoughError, PlatformError
 
 Array = NDArray[np.float64]
+LARGEST = 1e100  # products of a few numbers below it do not overflow
 
 
 def as_batch(name: str, value: ArrayLike, trailing: tuple[int, ...]) -> Array:
@@ -20,54 +23,73 @@ def as_batch(name: str, value: ArrayLike, trailing: tuple[int, ...]) -> Array:
     return array
 
 
+def frozen(array: Array) -> Array:
+    """The same array, made read-only."""
+    array.flags.writeable = False
+    return array
+
+
 def _to_float(name: str, value: ArrayLike) -> Array:
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return value
     try:
         array = np.asarray(value)
-    except ValueError:
-        raise GoughError(f"{name}: rows of unequal length; {_ragged(value)}") from None
-    if array.dtype.kind in "fiu":
+    except ValueError:  # rows of unequal length, or nested deeper than NumPy goes
+        array = None
+    if array is not None and array.dtype.kind in "fiu":
         return array.astype(np.float64)
-    place, found = _first_non_number(value)
-    raise GoughError(f"{name}{place}: expected a number, found {found!r}")
+    _refuse_non_numbers(name, value)
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except ValueError:
+        raise GoughError(f"{name}: rows of unequal length{_row_lengths(value)}") from None
 
 
-def _ragged(value: object) -> str:
+def _row_lengths(value: object) -> str:
     rows = list(value) if isinstance(value, (list, tuple)) else []
     widths = [len(r) if isinstance(r, (list, tuple)) else "a number" for r in rows]
-    return f"their lengths are {widths}"
+    return f"; their lengths are {widths}" if len(set(widths)) > 1 else ""
 
 
-def _first_non_number(value: object, place: str = "") -> tuple[str, object]:
-    """Index path and content of the first entry that is not a real number."""
-    if isinstance(value, (list, tuple, np.ndarray)):
+def _refuse_non_numbers(name: str, value: object) -> None:
+    """GoughError with the index of the first entry that is not a real number."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
         for i, item in enumerate(value):
-            where, found = _first_non_number(item, f"{place}[{i}]")
-            if where:
-                return where, found
-        return ("", value) if place == "" else ("", None)
-    is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-    if is_number and not isinstance(value, (complex, np.complexfloating)):
-        return "", None
-    return place or " ", value
+            _refuse_non_numbers(f"{name}[{i}]", item)
+    elif not _is_number(value):
+        raise GoughError(f"{name}: expected a number, found {reprlib.repr(value)}")
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, (bool, np.bool, np.complexfloating)):
+        return False
+    if isinstance(value, int):  # Python's have no largest; float64's have
+        return abs(value) < LARGEST
+    return isinstance(value, (float, np.number))
 
 
 def platform_numbers(name: str, value: ArrayLike) -> Array:
+    """`value` as a float64 array of any shape, for a field of a platform."""
     try:
-        return as_batch(name, value, ())
+        array = as_batch(name, value, ())
+        _refuse_non_numbers(name, value)  # NumPy takes [0, True] for two numbers
     except GoughError as error:
         raise PlatformError(str(error)) from None
+    return array
 
 
 def platform_field(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """A frozen copy of `value`, which must have `shape` and hold no NaN or infinity."""
-    array = np.array(platform_numbers(name, value))
+    array = np.array(platform_numbers(name, value) + 0.0)  # a copy, without negative zeros
     if array.shape != shape:
-        raise PlatformError(f"{name}: expected shape {shape}, got {array.shape}")
-    if not np.all(np.isfinite(array)):
-        place = "".join(f"[{i}]" for i in np.argwhere(~np.isfinite(array))[0])
-        found = array[~np.isfinite(array)].flat[0]
-        raise PlatformError(f"{name}{place}: expected a finite number, found {found}")
-    array.flags.writeable = False
-    return array
+        wanted = f"shape {shape}" if shape else "one number"
+        raise PlatformError(f"{name}: expected {wanted}, got shape {array.shape}")
+    usable = np.abs(array) < LARGEST
+    if not np.all(usable):
+        place = "".join(f"[{i}]" for i in np.argwhere(~usable)[0]) if shape else ""
+        found = array[~usable].flat[0]
+        wanted = f"a number below {LARGEST:g}" if np.isfinite(found) else "a finite number"
+        raise PlatformError(f"{name}{place}: expected {wanted}, found {found}")
+    return frozen(array)

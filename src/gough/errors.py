@@ -1,5 +1,9 @@
 """The errors that a user can cause."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 
 class GoughError(ValueError):
     """Something the caller can put right; the text says what, where and how."""
@@ -11,3 +15,11 @@ class PlatformError(GoughError):
 
 class InputError(GoughError):
     """A file or an argument that cannot be read as poses or legs."""
+
+
+def suggestion(name: str, choices: Iterable[str]) -> str:
+    """What follows an unknown name: the choice most like it, if one is."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(choices), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ";"

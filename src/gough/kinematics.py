@@ -146,20 +146,34 @@ def pose_covariance(platform: Platform, pose: Pose, leg_noise: ArrayLike) -> Arr
     Raises:
         GoughError: noise of another shape, negative or not finite.
     """
-    noise = np.asarray(leg_noise, dtype=float)
-    if noise.shape not in ((), (6,), (6, 6)):
-        raise GoughError(f"leg_noise: expected a number, (6,) or (6, 6), got {noise.shape}")
-    if not np.all(np.isfinite(noise)) or (noise.ndim < 2 and np.any(noise < 0)):
-        raise GoughError(f"leg_noise: expected standard deviations of 0 or more, found {noise}")
-    if noise.ndim == 2:
-        covariance = noise
-    else:
-        covariance = np.diag(np.broadcast_to(noise, 6) ** 2)
+    covariance = _leg_covariance(leg_noise)
     J = jacobian(platform, pose)
     rows, known = _finite_rows(J)
     regular = (known & (np.linalg.det(rows) != 0))[..., None, None]
     inverse = np.linalg.inv(np.where(regular, J, np.eye(6)))
     return np.where(regular, inverse @ covariance @ np.swapaxes(inverse, -1, -2), np.nan)
+
+
+def _leg_covariance(leg_noise: ArrayLike) -> Array:
+    """Covariance (6, 6) of the readings from any of the ways to state their noise."""
+    noise = as_batch("leg_noise", leg_noise, ())
+    if noise.shape not in ((), (6,), (6, 6)):
+        raise GoughError(f"leg_noise: expected a number, (6,) or (6, 6), got {noise.shape}")
+    if noise.ndim < 2:
+        if not np.all((noise >= 0) & (noise < np.inf)):
+            raise GoughError(f"leg_noise: expected standard deviations of 0 or more, found {noise}")
+        return np.diag(np.broadcast_to(noise, 6) ** 2)
+    slack = 1e-9 * np.max(np.abs(noise))
+    if (
+        not np.all(np.isfinite(noise))
+        or np.any(np.abs(noise - noise.T) > slack)
+        or np.linalg.eigvalsh(noise)[0] < -slack
+    ):
+        raise GoughError(
+            "leg_noise: expected a covariance: finite, symmetric, no negative eigenvalue; "
+            f"found {noise.tolist()}"
+        )
+    return noise
 
 
 def _arms(platform: Platform, pose: Pose) -> Array:

@@ -8,12 +8,12 @@ from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough.checks import Array, platform_field, platform_numbers
+from gough.checks import Array, frozen, platform_field, platform_numbers
 from gough.errors import PlatformError
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -60,6 +60,23 @@ class Platform:
     workspace: Workspace | None = None
     rotary: RotaryArms | None = None
 
+    if TYPE_CHECKING:  # what may be passed is wider than what is held
+
+        def __init__(
+            self,
+            base: ArrayLike,
+            moving: ArrayLike,
+            home: Pose | ArrayLike = ...,
+            *,
+            unit: str = ...,
+            name: str = ...,
+            legs: LegKind = ...,
+            stroke: ArrayLike | None = ...,
+            pivot: ArrayLike | None = ...,
+            workspace: Workspace | None = ...,
+            rotary: RotaryArms | None = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
         for name in ("base", "moving"):
@@ -71,6 +88,10 @@ class Platform:
         if self.legs not in get_args(LegKind):
             kinds = ", ".join(get_args(LegKind))
             raise PlatformError(f"legs: expected one of {kinds}; found {self.legs!r}")
+        for name, kind in (("rotary", RotaryArms), ("workspace", Workspace)):
+            part = getattr(self, name)
+            if part is not None and not isinstance(part, kind):
+                raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
         if (self.legs == "rotary") != (self.rotary is not None):
             need = "needs" if self.legs == "rotary" else "must not have"
             raise PlatformError(f"rotary: a platform with {self.legs} legs {need} this table")
@@ -78,7 +99,6 @@ class Platform:
             put("pivot", platform_field("pivot", self.pivot, (3,)))
         self._check_coincident_joints()
         self._check_stroke(put)
-        self._check_workspace()
 
     # ---- files ------------------------------------------------------------------------
 
@@ -117,21 +137,21 @@ class Platform:
     @cached_property
     def pivot_point(self) -> Array:
         """The pivot, zero where none is given, (3,)."""
-        return np.zeros(3) if self.pivot is None else self.pivot
+        return frozen(np.zeros(3)) if self.pivot is None else self.pivot
 
     @cached_property
     def home_lengths(self) -> Array:
         """Distance between the two joints of each leg at home, (6,) [platform unit]."""
         from gough.kinematics import strut_vectors
 
-        return np.linalg.norm(strut_vectors(self, self.home), axis=-1)
+        return frozen(np.linalg.norm(strut_vectors(self, self.home), axis=-1))
 
     @cached_property
     def home_legs(self) -> Array:
         """Readings at home, (6,): lengths, zeros (length_change) or angles [rad]."""
         from gough.kinematics import leg_lengths
 
-        return leg_lengths(self, self.home)
+        return frozen(leg_lengths(self, self.home))
 
     @cached_property
     def size(self) -> float:
@@ -251,7 +271,7 @@ class Platform:
             raise PlatformError(
                 f"stroke: expected [lowest, highest] or six such pairs, got shape {limits.shape}"
             )
-        limits = np.array(np.broadcast_to(limits, (6, 2)))
+        limits = frozen(np.broadcast_to(limits, (6, 2)) + 0.0)
         put("stroke", limits)
         for i, (low, high) in enumerate(limits):
             if not low < high:
@@ -264,16 +284,12 @@ class Platform:
                     f"allowed are {low:.6g} to {high:.6g}; change home or stroke"
                 )
 
-    def _check_workspace(self) -> None:
-        if self.workspace is not None and not isinstance(self.workspace, Workspace):
-            raise PlatformError(f"workspace: expected a Workspace, found {self.workspace!r}")
-
     # ---- identity ---------------------------------------------------------------------
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Platform):
             return NotImplemented
-        return self.to_dict() == other.to_dict()
+        return self is other or (self.digest == other.digest and self.name == other.name)
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -295,5 +311,6 @@ def _home(value: Pose | ArrayLike) -> Pose:
     if pose.batch:
         raise PlatformError(f"home: expected one pose, found batch axes {pose.batch}")
     return Pose(
-        platform_field("home.position", pose.position, (3,)), platform_field("home.wxyz", pose.wxyz, (4,))
+        platform_field("home.position", pose.position, (3,)),
+        platform_field("home.wxyz", pose.wxyz, (4,)),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import tempfile
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gough.checks import platform_field
-from gough.errors import GoughError, PlatformError
+from gough.errors import GoughError, PlatformError, suggestion
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -42,10 +41,9 @@ def catalog_text(name: str) -> str:
     """
     names = catalog_names()
     if name not in names:
-        near = difflib.get_close_matches(name, names, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
         raise PlatformError(
-            f"no platform is called {name!r}; {hint}The catalog has: {', '.join(names)}. "
+            f"no platform is called {name!r}{suggestion(name, names)} the catalog has "
+            f"{', '.join(names)}. "
             "The path of a platform of your own must end in .toml"
         )
     return resources.files("gough").joinpath("catalog", f"{name}.toml").read_text("utf-8")
@@ -63,6 +61,8 @@ def load(name_or_path: str | Path) -> Platform:
         raise PlatformError(f"{path}: not a text file; expected TOML") from None
     except OSError as error:
         raise PlatformError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a NUL in the path
+        raise PlatformError(f"{text_name!r}: cannot be read: {error}") from None
     return from_toml(text, where=str(path))
 
 
@@ -73,6 +73,10 @@ def from_toml(text: str, where: str = "platform") -> Platform:
     except tomllib.TOMLDecodeError as error:
         raise PlatformError(f"{where}: not valid TOML: {error}") from None
     except GoughError as error:
+        raise PlatformError(f"{where}: {error}") from None
+    except RecursionError:
+        raise PlatformError(f"{where}: lists are nested too deeply for a platform") from None
+    except ValueError as error:  # an integer of thousands of digits
         raise PlatformError(f"{where}: {error}") from None
 
 
@@ -147,15 +151,19 @@ def _home(table: dict) -> Pose:
     if "euler_deg" in table:
         angles = platform_field("home.euler_deg", table["euler_deg"], (3,))
         return Pose.from_euler(position, np.radians(angles))
-    return Pose(position, platform_field("home.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,)))
+    wxyz = platform_field("home.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,))
+    try:
+        return Pose(position, wxyz)
+    except GoughError as error:
+        raise PlatformError(f"home.{error}") from None
 
 
 def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:
     for key in table:
         if key not in keys:
-            near = difflib.get_close_matches(key, keys, n=1)
-            hint = f"did you mean {prefix}{near[0]}? " if near else ""
-            raise PlatformError(f"{prefix}{key}: unknown field; {hint}Fields: {', '.join(keys)}")
+            raise PlatformError(
+                f"{prefix}{key}: unknown field{suggestion(key, keys)} fields are {', '.join(keys)}"
+            )
 
 
 def _value(value: object) -> str:

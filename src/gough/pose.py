@@ -7,11 +7,12 @@ vectors; Euler angles are the paper's, R = Rx(a) Ry(b) Rz(c).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gough.checks import Array, as_batch
+from gough.checks import LARGEST, Array, as_batch
 from gough.errors import GoughError
 
 SERIES_ANGLE = 0.3  # [rad] below it, series whose first dropped term is under 1e-15
@@ -35,18 +36,27 @@ class Pose:
         """Broadcasts the two against each other and normalises the quaternion.
 
         Raises:
-            GoughError: wrong shapes, or a quaternion that is zero.
+            GoughError: wrong shapes, or a quaternion of length zero or beyond 1e+-100.
         """
         t = as_batch("position", position, (3,))
         q = as_batch("wxyz", wxyz, (4,))
-        norm = np.linalg.norm(q, axis=-1, keepdims=True)
-        if np.any(norm == 0):
-            raise GoughError("wxyz: a quaternion of zeros is no rotation")
+        with np.errstate(over="ignore"):
+            norm = np.linalg.norm(q, axis=-1, keepdims=True)
+        if np.any((norm < 1 / LARGEST) | (norm > LARGEST)):
+            raise GoughError(_no_rotation(q, norm[..., 0]))
         # rows of unit length to rounding stay as they are: making a pose twice changes no bit
         q = q / np.where(np.abs(norm - 1) < 1e-15, 1.0, norm)
         batch = np.broadcast_shapes(t.shape[:-1], q.shape[:-1])
         object.__setattr__(self, "position", np.broadcast_to(t, (*batch, 3)))
         object.__setattr__(self, "wxyz", np.broadcast_to(q, (*batch, 4)))
+
+    @classmethod
+    def trusted(cls, position: Array, wxyz: Array) -> Pose:
+        """From arrays known to be right -- equal batch axes, unit quaternions -- unchecked."""
+        pose = object.__new__(cls)
+        object.__setattr__(pose, "position", position)
+        object.__setattr__(pose, "wxyz", wxyz)
+        return pose
 
     # ---- made from --------------------------------------------------------------------
 
@@ -70,8 +80,9 @@ class Pose:
     def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
         """From (..., 3) and Euler angles (..., 3) [rad], R = Rx(a) Ry(b) Rz(c)."""
         half = as_batch("angles", angles, (3,)) / 2
-        (ca, cb, cc), (sa, sb, sc) = np.moveaxis(np.cos(half), -1, 0), np.moveaxis(
-            np.sin(half), -1, 0
+        (ca, cb, cc), (sa, sb, sc) = (
+            np.moveaxis(np.cos(half), -1, 0),
+            np.moveaxis(np.sin(half), -1, 0),
         )
         w = ca * cb * cc - sa * sb * sc
         x = sa * cb * cc + ca * sb * sc
@@ -115,11 +126,19 @@ class Pose:
 
     @property
     def euler(self) -> Array:
-        """Euler angles (..., 3) [rad] with R = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2]."""
+        """Euler angles (..., 3) [rad] with R = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2].
+
+        From half the sum and half the difference of a and c, so that the angles describe the
+        rotation to rounding at b = +-pi/2 too, where only one of the two is determined
+        (Bernardes and Viollet 2022).
+        """
         w, x, y, z = np.moveaxis(self.wxyz, -1, 0)
-        a = np.arctan2(2 * (w * x - y * z), 1 - 2 * (x * x + y * y))
-        b = np.arcsin(np.clip(2 * (x * z + w * y), -1, 1))
-        c = np.arctan2(2 * (w * z - x * y), 1 - 2 * (y * y + z * z))
+        plus, minus = np.arctan2(x + z, w + y), np.arctan2(x - z, w - y)
+        b = 2 * np.arctan2(np.hypot(w + y, x + z), np.hypot(w - y, x - z)) - np.pi / 2
+        a, c = (
+            angle - 2 * np.pi * np.round(angle / (2 * np.pi))
+            for angle in (plus + minus, plus - minus)
+        )
         return np.stack([a, b, c], axis=-1)
 
     @property
@@ -152,16 +171,22 @@ class Pose:
             raise TypeError("a single pose has no length; its batch axes are ()")
         return self.batch[0]
 
-    def __getitem__(self, index: object) -> Pose:
+    def __getitem__(self, index: Any) -> Pose:
         if not self.batch:
             raise IndexError("a single pose has no rows; its batch axes are ()")
         rows = index if isinstance(index, tuple) else (index,)
-        return Pose(self.position[(*rows, ..., slice(None))], self.wxyz[(*rows, ..., slice(None))])
+        if not any(i is Ellipsis for i in rows):
+            rows = (*rows, ...)
+        return Pose(self.position[(*rows, slice(None))], self.wxyz[(*rows, slice(None))])
 
     def apply(self, points: ArrayLike) -> Array:
         """R p + t for points (..., 3); the batch axes broadcast against the points' own."""
         p = as_batch("points", points, (3,))
         return (self.rotation @ p[..., None])[..., 0] + self.position
+
+    def copy(self) -> Pose:
+        """A pose with arrays of its own."""
+        return Pose.trusted(self.position.copy(), self.wxyz.copy())
 
     def inverse(self) -> Pose:
         """The pose that undoes this one."""
@@ -183,6 +208,13 @@ class Pose:
             return f"Pose(batch {self.batch})"
         numbers = [", ".join(f"{v:.9g}" for v in row) for row in (self.position, self.wxyz)]
         return f"Pose(position=({numbers[0]}), wxyz=({numbers[1]}))"
+
+
+def _no_rotation(wxyz: Array, norm: Array) -> str:
+    if np.any(norm == 0):
+        return "wxyz: a quaternion of zeros is no rotation"
+    found = wxyz[(norm < 1 / LARGEST) | (norm > LARGEST)][0].tolist()
+    return f"wxyz: expected a quaternion of about unit length, found {found}"
 
 
 def wxyz_product(a: Array, b: Array) -> Array:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gough.checks import Array, platform_field
 from gough.errors import PlatformError
@@ -32,6 +34,17 @@ class RotaryArms:
     axis_x: Array
     axis_y: Array
     branch: Array
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            arm_length: float,
+            rod_length: float,
+            axis_x: ArrayLike,
+            axis_y: ArrayLike,
+            branch: ArrayLike,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("arm_length", "rod_length"):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough.checks import Array, platform_field
+from gough.checks import Array, platform_field, platform_numbers
 from gough.errors import PlatformError
 from gough.pose import Pose, wxyz_product
 
@@ -26,6 +27,10 @@ class Workspace:
 
     translation: Array
     rotation_deg: Array
+
+    if TYPE_CHECKING:
+
+        def __init__(self, translation: ArrayLike, rotation_deg: ArrayLike) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("translation", "rotation_deg"):
@@ -46,7 +51,10 @@ class Workspace:
     @classmethod
     def about_home(cls, translation: ArrayLike, rotation_deg: ArrayLike) -> Workspace:
         """From boxes (3, 2), or one number each: as far on every axis and to both sides."""
-        boxes = [np.asarray(v, dtype=float) for v in (translation, rotation_deg)]
+        boxes = [
+            platform_numbers("workspace.translation", translation),
+            platform_numbers("workspace.rotation_deg", rotation_deg),
+        ]
         return cls(*(np.tile([-b, b], (3, 1)) if b.ndim == 0 else b for b in boxes))
 
     def sample(self, home: Pose, count: int, seed: int) -> Pose:

@@ -7,8 +7,8 @@ import pytest
 from machines import ALL, poses_of
 
 import gough
+from gough.fk.certificate import TURNS, _bulk_with, certify_batch
 from gough.kinematics import equivalent_struts, joint_radius
-from gough.modes.certificate import TURNS, _bulk_with, certify_batch
 from gough.pose import wxyz_to_matrix
 
 

@@ -8,9 +8,9 @@ from machines import poses_of
 
 import gough
 from gough.fk.jit import jit
+from gough.fk.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
 from gough.modes.finish import repeated
 from gough.modes.follow import Parameters, follow
-from gough.modes.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
 from gough.modes.monodromy import gaussian
 from gough.modes.series import (
     BASE,

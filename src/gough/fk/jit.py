@@ -1,8 +1,12 @@
-"""Numba's decorator, set up once: compiled code is cached where a folder can be written."""
+"""Numba's decorator, set up once: safe fast-math, no GIL, and a cache that notices changes."""
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
 from typing import TypeVar
 
 import numba
@@ -10,27 +14,50 @@ import numba
 Function = TypeVar("Function", bound=Callable)
 
 # Reordering and fused multiply-add are allowed; assuming that NaN and infinity do not occur
-# is not, since invalid readings must stay visible.
+# is not, since invalid readings must stay visible. Mind that Numba's isfinite(x) is
+# x - x == 0, which these flags fold to True: compare abs(x) < inf instead.
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Function], Function]:
-    """`numba.njit` with nogil, the safe fast-math flags and an on-disk cache if there is room.
+    """`numba.njit` with nogil, the flags above and compiled code kept on disk if there is room.
 
     Args:
         fast: allow reassociation; off where the order of operations carries meaning.
         cache: keep the compiled code on disk. Where neither the package's folder nor the
             user's cache folder can be written (and NUMBA_CACHE_DIR names no other), Numba
             cannot cache; the code is then compiled anew in every process.
+        options: passed on to `numba.njit`.
     """
     settings = {"nogil": True, "fastmath": FAST if fast else False, "error_model": "numpy"}
 
     def decorate(function: Function) -> Function:
         try:
-            return numba.njit(cache=cache, **settings, **options)(function)
+            compiled = numba.njit(cache=cache, **settings, **options)(function)
         except RuntimeError as error:
             if "no locator" not in str(error):
                 raise
-            return numba.njit(**settings, **options)(function)
+            return numba.njit(**settings, **options)(function)  # pyright: ignore
+        if cache:
+            _depend_on_whole_package(compiled, Path(inspect.getfile(function)).parent)
+        return compiled  # pyright: ignore[reportReturnType]
 
     return decorate
+
+
+def _depend_on_whole_package(compiled, folder: Path) -> None:
+    """Let cached code expire when any source beside it, or in this package, changes.
+
+    Numba itself looks at the function's own file only; a change in a function that was
+    compiled into it (`equations.py`, say) would go unnoticed and old code would run on.
+    """
+    file = compiled._cache._cache_file
+    file._source_stamp = (file._source_stamp, _digest(folder), _digest(Path(__file__).parent))
+
+
+@lru_cache
+def _digest(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for path in sorted(folder.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ class Status(IntEnum):
     UNREACHABLE = 4
     NOT_CONVERGED = 5
     INVALID_INPUT = 6
+    CERTIFIED = 7
 
     @property
     def text(self) -> str:
@@ -39,7 +41,9 @@ class Status(IntEnum):
         return self in USABLE
 
 
-USABLE = (Status.CONVERGED, Status.OUTSIDE_STROKE, Status.NEAR_SINGULARITY)
+USABLE = (
+    Status.CONVERGED, Status.OUTSIDE_STROKE, Status.NEAR_SINGULARITY, Status.CERTIFIED,
+)  # fmt: skip
 
 _TEXTS = {
     Status.CONVERGED: "The pose has these leg readings to within the tolerance.",
@@ -67,6 +71,10 @@ _TEXTS = {
     Status.INVALID_INPUT: (
         "A reading is not a finite number, or a length is not above zero: correct the row."
     ),
+    Status.CERTIFIED: (
+        "Proven: exactly one pose with these leg readings lies within the stated radius of this "
+        "one."
+    ),
 }
 
 
@@ -76,18 +84,21 @@ class Solution:
 
     Attributes:
         pose: batch axes (...) as the legs had; NaN where the input was invalid.
-        status: (...) uint8, to be compared with `Status` members.
+        status: (...) uint8, to be compared with `Status` members; a `Status` for a single row.
         residual: (...) largest difference between a strut's length at the pose and the length
             that its reading asks for [platform unit]; NaN where the input was invalid.
         iterations: (...) int32, Newton steps taken, over all starts that were tried.
         covariance: (..., 6, 6) pose covariance, see `gough.pose_covariance`, or None.
+        radius: (...) radius of uniqueness [platform unit], see `gough.Certificate`, 0 where
+            nothing is proven; None unless certificates were asked for.
     """
 
     pose: Pose
-    status: NDArray[np.uint8]
+    status: Any  # NDArray[np.uint8] | Status: the union would make every use of it a cast
     residual: Array
     iterations: NDArray[np.int32]
     covariance: Array | None = None
+    radius: Array | None = None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -99,11 +110,14 @@ class Solution:
         numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
         return {s: int(numbers[s]) for s in Status if numbers[s]}
 
-    def __getitem__(self, index: object) -> Solution:
+    def __getitem__(self, index: Any) -> Solution:
+        if isinstance(self.status, Status):
+            raise IndexError("the solution of a single row has no rows")
         covariance = None if self.covariance is None else self.covariance[index]
+        radius = None if self.radius is None else self.radius[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
-            covariance,
+            covariance, radius,
         )  # fmt: skip
 
     def __repr__(self) -> str:

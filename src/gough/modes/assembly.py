@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array, as_batch
+from gough.fk.certificate import certify
 from gough.kinematics import equivalent_struts
-from gough.modes.certificate import certify
 from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, is_far
 from gough.modes.follow import SHARE, Ends, follow
 from gough.modes.frames import Frames

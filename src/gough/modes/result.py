@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.fk.certificate import Certificate
 from gough.kinematics import (
     assembly_sign,
     equivalent_struts,
     joint_positions,
     singularity_distance,
 )
-from gough.modes.certificate import Certificate
 from gough.platform import Platform
 from gough.pose import Pose
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gough.fk.jit import jit
-from gough.modes.lanes import LANES, SLOT
+from gough.fk.lanes import LANES, SLOT
 from gough.modes.series import (
     BASE,
     BASE_RATE,

@@ -31,8 +31,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array
 from gough.fk.jit import jit
+from gough.fk.lanes import LANES, get_real, larger, magnitude, put_real, root
 from gough.kinematics import equivalent_struts
-from gough.modes.lanes import LANES, get_real, larger, magnitude, put_real, root
 from gough.platform import Platform
 from gough.pose import Pose, wxyz_to_matrix
 

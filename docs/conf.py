@@ -1,0 +1,31 @@
+"""Sphinx settings: MyST pages, the API from docstrings, warnings are errors (`make docs`)."""
+
+from importlib.util import find_spec
+
+from gough import __version__
+
+project = "gough"
+author = "the gough authors"
+copyright = "the gough authors, Apache-2.0"
+version = release = __version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build"]
+
+html_theme = "furo"
+html_title = f"gough {__version__}"
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+# a page may describe a part of the library whose own libraries are not installed here
+autodoc_mock_imports = [
+    name
+    for name in ("torch", "roma", "onnx", "onnxscript", "safetensors", "matplotlib", "viser")
+    if find_spec(name) is None
+]
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True

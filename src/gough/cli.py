@@ -1,0 +1,115 @@
+"""The command line: find the command, parse its options, turn errors into one line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from contextlib import suppress
+from importlib import import_module
+
+import gough
+from gough.commands import COMMANDS, stopping
+from gough.errors import GoughError, suggestion
+
+BAD_USAGE, BROKEN_PIPE = 2, 141
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command and exit.
+
+    Exit codes: 0 all rows have a usable answer; 1 some have not; 2 bad usage, unreadable input
+    or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 told to terminate.
+    """
+    given = sys.argv[1:] if arguments is None else arguments
+    stopping.listen()
+    code = _guarded(given)
+    stopping.ignore()
+    sys.exit(code)
+
+
+def _guarded(arguments: list[str]) -> int:
+    """The exit code of a command, whatever happens in it."""
+    name = " ".join(["gough", *[a for a in arguments[:1] if a in COMMANDS]])
+    try:
+        code = _dispatch(arguments)
+        sys.stdout.flush()
+        return code
+    except GoughError as error:
+        return _complain(f"{name}: error: {error}")
+    except stopping.Stopped as stop:
+        return _stopped(name, stop.number)
+    except BrokenPipeError:
+        _drop_output()
+        return BROKEN_PIPE
+    except MemoryError:
+        return _complain(f"{name}: error: not enough memory; pass a smaller --block-rows")
+    except OSError as error:
+        _drop_output()
+        where = f"{error.filename}: " if error.filename else ""
+        return _complain(f"{name}: error: {where}{error.strerror or error}")
+    except Exception:
+        number = stopping.asked()
+        if number is None:
+            raise
+        return _stopped(name, number)  # a library made another error of it
+
+
+def _stopped(name: str, number: int) -> int:
+    how = "interrupted" if number == signal.SIGINT else "terminated"
+    _complain(f"{name}: {how}; no file was changed")
+    return 128 + number
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(_help(), file=sys.stdout if arguments else sys.stderr)
+        return 0 if arguments else BAD_USAGE
+    command, rest = arguments[0], arguments[1:]
+    if command in ("-V", "--version", "version"):
+        print(f"gough {gough.__version__}")
+        return 0
+    if command not in COMMANDS:
+        near = suggestion(command, COMMANDS)
+        raise GoughError(f"no command {command!r}{near} commands are {', '.join(COMMANDS)}")
+    import tyro
+
+    module, function, _ = COMMANDS[command]
+    run = getattr(import_module(module), function)
+    # flags are --flag alone, without a --no-flag beside it
+    config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes)
+    return tyro.cli(run, prog=f"gough {command}", args=rest, config=config)
+
+
+def _help() -> str:
+    lines = [f"  {name:<11} {text}" for name, (_, _, text) in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: gough COMMAND [OPTIONS]",
+            "",
+            "Where a hexapod is: its poses from the lengths of its legs, and back.",
+            "",
+            "commands:",
+            *lines,
+            "",
+            "gough COMMAND --help tells more; gough --version prints the version.",
+        ]
+    )
+
+
+def _complain(text: str) -> int:
+    """One line on stderr, which may be gone too."""
+    with suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
+    return BAD_USAGE
+
+
+def _drop_output() -> None:
+    """Send what Python still holds for standard output to nowhere, so that exit is silent."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""gough inverse: leg readings from a file of poses."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from gough.commands.options import (
+    AllowFailures,
+    BlockRows,
+    Head,
+    IgnorePlatform,
+    Keep,
+    KeepBadRows,
+    Out,
+    PlatformName,
+    reading_options,
+)
+
+
+def run(
+    poses: Annotated[Positional[str], arg(metavar="POSES")],
+    *,
+    platform: PlatformName,
+    out: Out = None,
+    keep: Keep = "",
+    keep_bad_rows: KeepBadRows = False,
+    allow_failures: AllowFailures = False,
+    ignore_platform: IgnorePlatform = False,
+    head: Head = 5,
+    block_rows: BlockRows = 65536,
+) -> int:
+    """Leg readings from a file of poses.
+
+    gough inverse poses.csv -p rubin_camera -o legs.parquet
+
+    Columns of a pose: x, y, z in the platform's unit, and its rotation:
+
+    qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz).
+
+    Exit code 0: all rows have legs; 1: some have not; 2: nothing was written.
+
+    Args:
+        poses: .csv or .parquet with these columns, or - for CSV on standard input.
+    """
+    from gough.commands import show
+    from gough.files import inverse_file
+    from gough.platform import Platform
+
+    machine = Platform.load(platform)
+    with show.progress_bar() as progress:
+        report = inverse_file(
+            poses, out, machine, progress=progress, head=0 if out else head,
+            reading=reading_options(keep, keep_bad_rows, ignore_platform, block_rows),
+        )  # fmt: skip
+    screen = show.console_beside(out)
+    if not out and head:
+        show.print_legs(report, machine, screen)
+    show.print_invalid(report, poses)
+    show.print_summary(report, machine, out, screen)
+    return 1 if report.failures and not allow_failures else 0

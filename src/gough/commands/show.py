@@ -1,0 +1,151 @@
+"""Tables, summaries and the progress bar."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.box import Box
+from rich.console import Console
+from rich.table import Table
+
+from gough.commands import stopping
+
+if TYPE_CHECKING:
+    from gough.files.jobs import Progress as Tick
+    from gough.files.report import Report
+    from gough.files.source import Source
+    from gough.platform import Platform
+
+NOTICED = 2.0  # [s] of compiling that deserve a word
+STANDARD = "-"  # as in gough.files, which is too heavy to import for a help text
+# one rule, below the head
+RULE = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
+
+
+def console(*, errors: bool = False) -> Console:
+    """Plain text on standard output or standard error; numbers are not coloured."""
+    return Console(stderr=errors, highlight=False, soft_wrap=False)
+
+
+def console_beside(out: str | None) -> Console:
+    """Where to print when results go to `out`: standard error if they take standard output."""
+    return console(errors=out == STANDARD)
+
+
+def plain_table(*heads: str) -> Table:
+    """A table with a rule below its head; a head that starts with > is set to the right."""
+    table = Table(box=RULE, pad_edge=False, padding=(0, 1, 0, 0), header_style="", show_edge=False)
+    for head in heads:
+        side = "right" if head.startswith(">") else "left"
+        table.add_column(head.removeprefix(">"), justify=side, no_wrap=head != "status")
+    return table
+
+
+def print_summary(report: Report, platform: Platform, out: str | None, screen: Console) -> None:
+    """Rows by status with shares, worst residuals and what each status means."""
+    target = "" if out is None else f", written to {'standard output' if out == STANDARD else out}"
+    rate = report.rows / max(report.seconds, 1e-9)
+    screen.print(
+        f"{report.rows:,} rows in {report.seconds:.3g} s ({rate:,.0f} rows/s){target}",
+        markup=False,
+    )
+    if report.preparing > NOTICED:
+        screen.print(f"(before that {report.preparing:.0f} s to compile the solver, once)")
+    residuals = not np.all(np.isnan(report.worst))
+    heads = ["status", ">rows", ">share"] + ["worst residual"] * residuals
+    table = plain_table(*heads)
+    found = [i for i in range(len(report.counts)) if report.counts[i]]
+    for i in found:
+        worst = report.worst[i]
+        row = [report.outcomes[i].label, f"{report.counts[i]:,}", _share(report, i)]
+        row += ["" if np.isnan(worst) else f"{worst:.2g} {platform.unit}"] * residuals
+        table.add_row(*row)
+    screen.print(table)
+    for i in found:
+        screen.print(f"{report.outcomes[i].label}: {report.outcomes[i].text}", markup=False)
+
+
+def _share(report: Report, i: int) -> str:
+    """A percentage that says 100 or 0 only where that is exact."""
+    share = 100 * report.counts[i] / report.rows
+    if 99.95 <= share < 100:
+        return "> 99.9 %"
+    return "< 0.1 %" if share < 0.05 else f"{share:.1f} %"
+
+
+def print_invalid(report: Report, where: str) -> None:
+    """The first invalid rows and how many more there are, on standard error."""
+    screen = console(errors=True)
+    for text in report.invalid:
+        screen.print(f"{where}: {text}", markup=False, soft_wrap=True)
+    invalid = next(
+        int(n)
+        for n, outcome in zip(report.counts, report.outcomes, strict=True)
+        if outcome.label == "invalid_input"
+    )
+    if invalid > len(report.invalid):
+        more = f"{where}: and {invalid - len(report.invalid):,} more invalid rows"
+        screen.print(more, markup=False, soft_wrap=True)
+
+
+def print_poses(report: Report, platform: Platform, screen: Console) -> None:
+    """The first poses, angles in degrees."""
+    unit = f" [{platform.unit}]".replace("[", r"\[") if platform.unit else ""
+    heads = [f">{name}{unit}" for name in ("x", "y", "z")]
+    table = plain_table(*heads, ">rx_deg", ">ry_deg", ">rz_deg", "status")
+    places = _decimals(platform.size)
+    angles = np.degrees(report.pose.euler)
+    for i, status in enumerate(report.status):
+        numbers = [f"{v:.{places}f}" for v in report.pose.position[i]]
+        numbers += [f"{v:.5f}" for v in angles[i]]
+        table.add_row(*numbers, report.outcomes[status].label)
+    screen.print(table)
+
+
+def print_legs(report: Report, platform: Platform, screen: Console) -> None:
+    """The first leg readings."""
+    table = plain_table(*(f">leg_{i}" for i in range(1, 7)), "status")
+    places = 6 if platform.legs == "rotary" else _decimals(platform.size)
+    for i, status in enumerate(report.status):
+        numbers = [f"{v:.{places}f}" for v in report.legs[i]]
+        table.add_row(*numbers, report.outcomes[status].label)
+    screen.print(table)
+
+
+def _decimals(size: float) -> int:
+    """Decimals that show a ten-millionth of a length: seven for a platform of a metre."""
+    return int(np.clip(7 - np.floor(np.log10(size)), 0, 12))
+
+
+@contextmanager
+def progress_bar() -> Iterator[Tick]:
+    """What to call after every block of rows.
+
+    It draws a bar with rate and remaining time on standard error, if that is a terminal, and
+    ends the command if a signal has asked for it.
+    """
+    if not sys.stderr.isatty():
+        yield lambda source, report: stopping.check()
+        return
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"))
+    with Progress(*columns, TimeRemainingColumn(), console=console(errors=True)) as bar:
+        task = bar.add_task("", total=None, rate="starting (a first run compiles)")
+
+        def update(source: Source, report: Report) -> None:
+            rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"
+            bar.update(task, completed=source.done, total=source.total, rate=rate)
+            stopping.check()
+
+        yield update

@@ -1,0 +1,15 @@
+"""Leg readings and poses in CSV and Parquet files of any size, a block of rows at a time.
+
+    report = solve_file("legs.parquet", "poses.parquet", platform)
+    report = inverse_file("poses.csv", "legs.csv", platform)
+
+A file name ending in .csv or .parquet picks the format; "-" is CSV on standard input or output.
+"""
+
+from __future__ import annotations
+
+from gough.files.jobs import inverse_file, solve_file
+from gough.files.report import Report
+from gough.files.source import Reading, open_source
+
+__all__ = ["Reading", "Report", "inverse_file", "open_source", "solve_file"]

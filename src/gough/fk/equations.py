@@ -1,0 +1,292 @@
+"""The mathematics of the refinement, once; the block and the row solver both run it.
+
+Everything here is free of units: lengths are divided by the platform's size, positions are
+those of the centre of the platform joints seen from the centre of the base joints, and q_i
+are the platform joints from their own centre. A pose (s, R) then leaves in leg i
+
+    a_i = R q_i,      d_i = a_i + s - b_i,      f_i = (l_i^2 - d_i . d_i) / 2,
+
+and a step (v, w), s -> s + v, R -> exp(w) R, changes d_i by v + w x a_i to first order. So
+Newton's method solves, without any square root,
+
+    d_i . v + (a_i x d_i) . w = f_i          i = 1..6                          (Merlet 5.1)
+
+by Gaussian elimination in a fixed order of the legs, chosen for the platform by partial
+pivoting at home (`geometry.py`): no branch, so a loop over poses becomes vector code. Rows
+whose pivots turn bad elsewhere do not settle and go to the damped solver of `rescue.py`.
+The rotation is stepped by the Cayley quaternion (1, w / 2), normalised: it agrees with
+exp(w) to second order and never turns by more than 180 deg, which damps wild steps.
+
+State lives in one flat buffer, component c of pose k at `buffer[c * stride + k]`: constant
+strides and one base pointer are what lets LLVM vectorise the loop over k.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gough.fk.jit import jit
+from gough.fk.layout import (
+    BASE,
+    CENTRE,
+    COUNT,
+    DETERMINANT,
+    ENOUGH,
+    HOME,
+    INSIDE,
+    JOINTS,
+    LENGTH,
+    PIVOT,
+    QUATERNION,
+    RADIUS,
+    REFERENCE,
+    REGULAR,
+    RESIDUAL,
+    SHIFT_HIGH,
+    SHIFT_LOW,
+    SQUARE,
+    STEP,
+    TURN,
+)
+
+SMALL = 1e-16  # squared step after which Newton's error is at rounding
+
+inline = jit(cache=False, forceinline=True)  # compiled into its callers, which are cached
+
+
+@inline
+def rotation(w, x, y, z):
+    """Rows of the rotation matrix of a unit quaternion, nine numbers."""
+    return (
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip
+
+
+@inline
+def turned(R, x, y, z):
+    """R (x, y, z)."""
+    return (
+        R[0] * x + R[1] * y + R[2] * z,
+        R[3] * x + R[4] * y + R[5] * z,
+        R[6] * x + R[7] * y + R[8] * z,
+    )
+
+
+@inline
+def strut(constants, buffer, k, stride, R, i):
+    """Leg i of pose k: a_i = R q_i and d_i, two triples."""
+    j = JOINTS + 3 * i
+    a = turned(R, constants[j], constants[j + 1], constants[j + 2])
+    b = (BASE + 3 * i) * stride + k
+    d = (
+        a[0] + (buffer[k] - buffer[b]),
+        a[1] + (buffer[stride + k] - buffer[b + stride]),
+        a[2] + (buffer[2 * stride + k] - buffer[b + 2 * stride]),
+    )
+    return a, d
+
+
+@inline
+def equation(constants, buffer, k, stride, R, i):
+    """Row i of the linear system: d_i, a_i x d_i, f_i as seven numbers."""
+    a, d = strut(constants, buffer, k, stride, R, i)
+    f = 0.5 * (buffer[(SQUARE + i) * stride + k] - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
+    return (
+        d[0], d[1], d[2],
+        a[1] * d[2] - a[2] * d[1], a[2] * d[0] - a[0] * d[2], a[0] * d[1] - a[1] * d[0],
+        f,
+    )  # fmt: skip
+
+
+# Elimination of the first unknown from row r by pivot row p, `inverse` being 1 / p[0]. The
+# result is one shorter; one function a length, since compiled tuples have a fixed length.
+
+
+@inline
+def _drop7(p, r, inverse):
+    m = r[0] * inverse
+    return (
+        r[1] - m * p[1], r[2] - m * p[2], r[3] - m * p[3],
+        r[4] - m * p[4], r[5] - m * p[5], r[6] - m * p[6],
+    )  # fmt: skip
+
+
+@inline
+def _drop6(p, r, inverse):
+    m = r[0] * inverse
+    return (
+        r[1] - m * p[1], r[2] - m * p[2], r[3] - m * p[3],
+        r[4] - m * p[4], r[5] - m * p[5],
+    )  # fmt: skip
+
+
+@inline
+def _drop5(p, r, inverse):
+    m = r[0] * inverse
+    return r[1] - m * p[1], r[2] - m * p[2], r[3] - m * p[3], r[4] - m * p[4]
+
+
+@inline
+def _drop4(p, r, inverse):
+    m = r[0] * inverse
+    return r[1] - m * p[1], r[2] - m * p[2], r[3] - m * p[3]
+
+
+@inline
+def _drop3(p, r, inverse):
+    m = r[0] * inverse
+    return r[1] - m * p[1], r[2] - m * p[2]
+
+
+@inline
+def eliminate(r0, r1, r2, r3, r4, r5):
+    """Solve the 6x6 system with rows r_i = (six coefficients, right side), no pivoting.
+
+    Returns the six unknowns and the determinant.
+    """
+    i0 = 1 / r0[0]
+    a1, a2, a3 = _drop7(r0, r1, i0), _drop7(r0, r2, i0), _drop7(r0, r3, i0)
+    a4, a5 = _drop7(r0, r4, i0), _drop7(r0, r5, i0)
+    i1 = 1 / a1[0]
+    b2, b3, b4, b5 = _drop6(a1, a2, i1), _drop6(a1, a3, i1), _drop6(a1, a4, i1), _drop6(a1, a5, i1)
+    i2 = 1 / b2[0]
+    c3, c4, c5 = _drop5(b2, b3, i2), _drop5(b2, b4, i2), _drop5(b2, b5, i2)
+    i3 = 1 / c3[0]
+    d4, d5 = _drop4(c3, c4, i3), _drop4(c3, c5, i3)
+    i4 = 1 / d4[0]
+    e5 = _drop3(d4, d5, i4)
+    x5 = e5[1] / e5[0]
+    x4 = (d4[2] - d4[1] * x5) * i4
+    x3 = (c3[3] - c3[1] * x4 - c3[2] * x5) * i3
+    x2 = (b2[4] - b2[1] * x3 - b2[2] * x4 - b2[3] * x5) * i2
+    x1 = (a1[5] - a1[1] * x2 - a1[2] * x3 - a1[3] * x4 - a1[4] * x5) * i1
+    x0 = (r0[6] - r0[1] * x1 - r0[2] * x2 - r0[3] * x3 - r0[4] * x4 - r0[5] * x5) * i0
+    return x0, x1, x2, x3, x4, x5, r0[0] * a1[0] * b2[0] * c3[0] * d4[0] * e5[0]
+
+
+@inline
+def put_quaternion(buffer, k, stride, w, x, y, z):
+    """Normalise a quaternion and store it as pose k's."""
+    inverse = 1 / np.sqrt(w * w + x * x + y * y + z * z)
+    buffer[QUATERNION * stride + k] = w * inverse
+    buffer[(QUATERNION + 1) * stride + k] = x * inverse
+    buffer[(QUATERNION + 2) * stride + k] = y * inverse
+    buffer[(QUATERNION + 3) * stride + k] = z * inverse
+
+
+@inline
+def get_quaternion(buffer, k, stride):
+    """Pose k's quaternion, four numbers."""
+    c = QUATERNION * stride + k
+    return buffer[c], buffer[c + stride], buffer[c + 2 * stride], buffer[c + 3 * stride]
+
+
+@inline
+def move(buffer, k, stride, active, v0, v1, v2, w0, w1, w2):
+    """Step pose k by translation v and rotation w (in base coordinates), if `active`."""
+    w, x, y, z = get_quaternion(buffer, k, stride)
+    a, b, c = 0.5 * w0, 0.5 * w1, 0.5 * w2
+    # selected, not multiplied by zero: even normalising again would change a last digit
+    buffer[k] = buffer[k] + v0 if active else buffer[k]
+    buffer[stride + k] = buffer[stride + k] + v1 if active else buffer[stride + k]
+    buffer[2 * stride + k] = buffer[2 * stride + k] + v2 if active else buffer[2 * stride + k]
+    new_w, new_x = w - a * x - b * y - c * z, x + a * w + b * z - c * y
+    new_y, new_z = y + b * w + c * x - a * z, z + c * w + a * y - b * x
+    inverse = 1 / np.sqrt(new_w * new_w + new_x * new_x + new_y * new_y + new_z * new_z)
+    at = QUATERNION * stride + k
+    buffer[at] = new_w * inverse if active else w
+    buffer[at + stride] = new_x * inverse if active else x
+    buffer[at + 2 * stride] = new_y * inverse if active else y
+    buffer[at + 3 * stride] = new_z * inverse if active else z
+
+
+@inline
+def newton_step(constants, buffer, k, stride):
+    """One Newton step of pose k, in place; stores its squared size and the determinant.
+
+    A pose whose last step was SMALL stays where it is, so that a row's answer does not depend
+    on how long its neighbours in the block take.
+    """
+    active = buffer[STEP * stride + k] > SMALL
+    w, x, y, z = get_quaternion(buffer, k, stride)
+    R = rotation(w, x, y, z)
+    v0, v1, v2, w0, w1, w2, determinant = eliminate(
+        equation(constants, buffer, k, stride, R, 0),
+        equation(constants, buffer, k, stride, R, 1),
+        equation(constants, buffer, k, stride, R, 2),
+        equation(constants, buffer, k, stride, R, 3),
+        equation(constants, buffer, k, stride, R, 4),
+        equation(constants, buffer, k, stride, R, 5),
+    )
+    move(buffer, k, stride, active, v0, v1, v2, w0, w1, w2)
+    buffer[COUNT * stride + k] += 1.0 if active else 0.0
+    buffer[STEP * stride + k] = v0 * v0 + v1 * v1 + v2 * v2 + w0 * w0 + w1 * w1 + w2 * w2
+    buffer[DETERMINANT * stride + k] = determinant
+
+
+@inline
+def _miss(constants, buffer, k, stride, R, i):
+    """| |d_i| - l_i |."""
+    _, d = strut(constants, buffer, k, stride, R, i)
+    length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    return np.abs(length - buffer[(LENGTH + i) * stride + k])
+
+
+@inline
+def _within(constants, axis, sine, cosine):
+    """Whether the angle of (cosine, sine), of any length, is in the axis' range: 1.0 or 0.0."""
+    t = TURN + 3 * axis
+    along = cosine * constants[t] + sine * constants[t + 1]  # |.| cos(angle - mid)
+    return 1.0 if along >= constants[t + 2] * np.sqrt(sine * sine + cosine * cosine) else 0.0
+
+
+@inline
+def assess(constants, buffer, k, stride):
+    """Residual of pose k, whether it is in the workspace, whether it is surely regular.
+
+    The determinant is that of the last Newton step's start, which at the end of a converged
+    iteration is the pose itself to half its digits.
+    """
+    w, x, y, z = get_quaternion(buffer, k, stride)
+    R = rotation(w, x, y, z)
+    m0 = _miss(constants, buffer, k, stride, R, 0)
+    m1 = _miss(constants, buffer, k, stride, R, 1)
+    m2 = _miss(constants, buffer, k, stride, R, 2)
+    m3 = _miss(constants, buffer, k, stride, R, 3)
+    m4 = _miss(constants, buffer, k, stride, R, 4)
+    m5 = _miss(constants, buffer, k, stride, R, 5)
+    worst = max(max(max(m0, m1), max(m2, m3)), max(m4, m5))
+    # max may drop a NaN; a sum cannot
+    buffer[RESIDUAL * stride + k] = worst + 0.0 * (m0 + m1 + m2 + m3 + m4 + m5)
+
+    c = LENGTH * stride + k
+    product = buffer[c] * buffer[c + stride] * buffer[c + 2 * stride]
+    product *= buffer[c + 3 * stride] * buffer[c + 4 * stride] * buffer[c + 5 * stride]
+    determinant = buffer[DETERMINANT * stride + k]
+    rho = constants[RADIUS]
+    regular = np.abs(determinant) > constants[ENOUGH] * product * (rho * rho * rho)
+    buffer[REGULAR * stride + k] = 1.0 if regular else 0.0
+
+    inside = 1.0 if determinant * constants[REFERENCE] > 0 else 0.0
+    p = turned(R, constants[PIVOT], constants[PIVOT + 1], constants[PIVOT + 2])
+    shift0 = buffer[k] + p[0] - constants[CENTRE]
+    shift1 = buffer[stride + k] + p[1] - constants[CENTRE + 1]
+    shift2 = buffer[2 * stride + k] + p[2] - constants[CENTRE + 2]
+    low, high = SHIFT_LOW, SHIFT_HIGH
+    inside *= 1.0 if (shift0 >= constants[low]) & (shift0 <= constants[high]) else 0.0
+    inside *= 1.0 if (shift1 >= constants[low + 1]) & (shift1 <= constants[high + 1]) else 0.0
+    inside *= 1.0 if (shift2 >= constants[low + 2]) & (shift2 <= constants[high + 2]) else 0.0
+    # the rotation from home: conj(home) * quaternion, then its Euler angles' sines, cosines
+    hw, hx, hy, hz = constants[HOME], constants[HOME + 1], constants[HOME + 2], constants[HOME + 3]
+    T = rotation(
+        hw * w + hx * x + hy * y + hz * z,
+        hw * x - hx * w - hy * z + hz * y,
+        hw * y + hx * z - hy * w - hz * x,
+        hw * z - hx * y + hy * x - hz * w,
+    )
+    inside *= _within(constants, 0, -T[5], T[8])
+    inside *= _within(constants, 1, T[2], np.sqrt(T[5] * T[5] + T[8] * T[8]))
+    inside *= _within(constants, 2, -T[1], T[0])
+    buffer[INSIDE * stride + k] = inside

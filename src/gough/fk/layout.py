@@ -1,0 +1,51 @@
+"""Where things are in the two flat arrays that the compiled code works on.
+
+One array each keeps the argument count down (a call from Python pays for every argument) and
+lets LLVM see that loads and stores do not overlap.
+"""
+
+# The buffer: component c of pose k is at buffer[c * stride + k].
+POSITION = 0  # s: 3
+QUATERNION = 3  # w, x, y, z: 4
+STEP = 7  # |v|^2 + |w|^2 of the last Newton step
+DETERMINANT = 8  # of the matrix with rows (d_i, a_i x d_i), legs in solving order
+LENGTH = 9  # l: 6
+SQUARE = 15  # l^2: 6
+BASE = 21  # b: 6 x 3
+RESIDUAL = 39  # largest | |d_i| - l_i |
+INSIDE = 40  # 1 in the workspace and on home's side of all singularities, else 0
+REGULAR = 41  # 1 where the distance to singularity is surely above the threshold, else 0
+COUNT = 42  # Newton steps taken
+PLACE = 43  # position as the user sees it [platform unit]: 3
+COMPONENTS = 46
+
+WIDTH = 64  # poses in a block: long enough for vector loops, short enough for the cache
+
+# The constants of a platform, made in `geometry.py`. Lengths are divided by its size.
+JOINTS = 0  # q: platform joints from their centre, legs in solving order: 6 x 3
+RADIUS = 18  # root mean square of |q_i|
+REFERENCE = 19  # sign of the determinant at home
+ENOUGH = 20  # determinant of the unit-free Jacobian above which a pose is surely regular
+CENTRE = 21  # what the workspace's positions are relative to: 3
+PIVOT = 24  # pivot from the centre of the platform joints: 3
+SHIFT_LOW = 27  # workspace: 3
+SHIFT_HIGH = 30  # workspace: 3
+HOME = 33  # home quaternion: 4
+TURN = 37  # cos mid, sin mid, cos half width of each Euler angle's range: 3 x 3
+ORDER = 46  # which reading each leg in solving order has: 6
+FIXED = 52  # base joints from their centre (arm centres, for rotary legs): 6 x 3
+OFFSET = 70  # added to a reading to give a length [platform unit]: 6
+ROTARY = 76  # 1 for rotary legs, else 0
+ROD = 77  # rod length
+ARM_X = 78  # arm length times axis_x: 6 x 3
+ARM_Y = 96  # arm length times axis_y: 6 x 3
+SIZE = 114  # of the platform [platform unit]
+ORIGIN = 115  # centre of the base joints minus pivot [platform unit]: 3
+START = 118  # home in internal coordinates: position 3, quaternion 4
+REST = 125  # readings at home, as they come: 6
+STROKE = 131  # lowest and highest reading, as they come: 6 x 2
+PER_SIZE = 143  # 1 / SIZE, made once: compilers may turn x (1 / y) into x / y in one loop only
+CONSTANTS = 144
+
+# Block verdicts from here on are not statuses: the row is still open.
+OPEN = 100

@@ -1,0 +1,204 @@
+"""Forward kinematics in a control loop: one reading in, one pose out, every cycle."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gough.errors import GoughError
+from gough.fk import geometry, layout
+from gough.fk.bulk import Settings
+from gough.fk.solve import solve
+from gough.fk.status import Status
+from gough.fk.track_kernel import BAD_READING, CROSSED, FAILED, STATE, cycle
+from gough.kinematics import assembly_sign
+from gough.platform import Platform
+from gough.pose import Pose
+
+
+class Event(IntEnum):
+    """What a cycle did to the pose; `text` is a sentence that says what to do."""
+
+    FOLLOWED = 0
+    FOUND = 1
+    HELD = 2
+    JUMPED = 3
+    MODE_CHANGED = 4
+
+    @property
+    def text(self) -> str:
+        """A sentence a user can act on."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Event.FOLLOWED: "The pose followed the reading from the last one.",
+    Event.FOUND: (
+        "The pose was found anew, without the last one's help: at the start, or after enough "
+        "readings in a row agreed on a place far from it."
+    ),
+    Event.HELD: (
+        "The reading has no pose, or is no reading, and the last good pose is held: see the "
+        "status for the reason. Tracking goes on with the next good reading."
+    ),
+    Event.JUMPED: (
+        "The reading asks for a pose too far away for one cycle, and the last good pose is held: "
+        "check the sensor, or allow a larger max_shift or max_turn."
+    ),
+    Event.MODE_CHANGED: (
+        "The reading leads across a singularity, so the assembly mode may have changed, and the "
+        "last good pose is held: stop, and check the pose by other means."
+    ),
+}
+
+
+class Tracker:
+    """Follows a platform from reading to reading.
+
+    Each cycle starts Newton's method at the last pose. A pose too far from it, or beyond a
+    singularity, is not believed at once: the last good pose is held and the event says so. If
+    `confirm` readings in a row lead to the same new place, it is taken, so that nothing can
+    keep the tracker from following good readings again.
+
+    Use one tracker from one thread; different trackers may run in different threads.
+
+    Attributes:
+        pose: the present pose. The same object every cycle, overwritten by the next `update`
+            (so that a cycle allocates nothing); `pose.copy()` keeps one.
+        status: `Status` of the last reading.
+        event: `Event` of the last cycle.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        *,
+        start: Pose | None = None,
+        max_shift: float | None = None,
+        max_turn: float = 0.1,
+        confirm: int = 3,
+        tol: float = 1e-12,
+        singular: float = geometry.SINGULAR,
+    ) -> None:
+        """Compiles what it needs, so that the first `update` is as quick as the others.
+
+        Args:
+            start: where the platform is; found from the first reading unless given.
+            max_shift: how far it can move in one cycle [platform unit]; 2 % of its size unless
+                given.
+            max_turn: how far it can turn in one cycle [rad].
+            confirm: how many readings must agree on a place too far away before it is taken.
+            tol, singular: as for `solve`.
+
+        Raises:
+            GoughError: a limit that is not above zero.
+        """
+        self.platform = platform
+        settings = Settings(tol=tol, singular=singular)
+        self._shift = 0.02 * platform.size if max_shift is None else max_shift
+        self._turn, self._confirm = max_turn, confirm
+        limits = {"max_shift": self._shift, "max_turn": max_turn, "confirm": confirm}
+        for name, value in limits.items():
+            if not value > 0:
+                raise GoughError(f"{name}: expected a number above 0, found {value!r}")
+        self._constants = geometry.constants(platform, singular)
+        self._limits = np.array([settings.tol, settings.singular, 0.0, 0.0])
+        self._legs = platform.home_legs[None].copy()
+        self._state = np.zeros((1, STATE))
+        self._buffer, self._work = np.zeros(layout.COMPONENTS), np.zeros((4, 6, 6))
+        self._position, self._wxyz = np.zeros((1, 3)), np.zeros((1, 4))
+        self._missed, self._agreeing = 0, 0
+        self._candidate: Pose | None = None
+        self.pose = Pose.trusted(self._position[0], self._wxyz[0])
+        self._code, self.event = int(Status.CONVERGED), Event.FOUND
+        self._take(platform.home)
+        self._run()  # these two compile what a cycle may need, if it is not yet on disk
+        solve(platform, platform.home_legs)
+        self._lost = start is None
+        self._take(platform.home if start is None else start)
+
+    @property
+    def status(self) -> Status:
+        """What is known about the last reading."""
+        return Status(self._code)
+
+    def update(self, legs: ArrayLike) -> Pose:
+        """The pose at the next reading (6,); `status` and `event` tell how far to trust it.
+
+        Raises:
+            GoughError: not six numbers. A reading that is NaN or impossible raises nothing.
+        """
+        try:
+            if len(legs) != 6:  # type: ignore[arg-type]
+                raise GoughError(f"legs: expected (6,), got {np.shape(legs)}")
+            self._legs[0] = legs
+        except (TypeError, ValueError) as error:
+            raise GoughError(f"legs: expected six numbers, found {legs!r}") from error
+        code = FAILED if self._lost else self._run()
+        if code >= layout.OPEN:
+            self._doubt(code)
+        else:
+            self._code, self.event = code, Event.FOLLOWED
+            if self._missed:
+                self._forget()
+        return self.pose
+
+    # ---- a cycle that went well -------------------------------------------------------
+
+    def _run(self) -> int:
+        return cycle(
+            self._constants, self._legs, self._state, self._limits, self._buffer, self._work,
+            self._position, self._wxyz,
+        )  # fmt: skip
+
+    def _forget(self) -> None:
+        """No reading is missing any more: one cycle's motion is the limit again."""
+        self._missed, self._agreeing, self._candidate = 0, 0, None
+        self._set_limits()
+
+    def _set_limits(self) -> None:
+        cycles = 1 + self._missed
+        turn = min(self._turn * cycles, np.pi)
+        self._limits[2] = (self._shift * cycles / self.platform.size) ** 2
+        self._limits[3] = np.sin(turn / 2) ** 2
+
+    def _take(self, pose: Pose) -> None:
+        """Make a pose the present one."""
+        self._state[0, :7] = geometry.to_internal(self._constants, pose)
+        home = self._constants[layout.REFERENCE]
+        self._state[0, 7] = float(assembly_sign(self.platform, pose)) * home
+        self._position[0], self._wxyz[0] = pose.position, pose.wxyz
+        self._forget()
+
+    # ---- a cycle that did not ---------------------------------------------------------
+
+    def _doubt(self, code: int) -> None:
+        """Hold the pose, and see whether the readings agree on another place."""
+        self._missed += 1
+        self._set_limits()
+        if code == BAD_READING:
+            self._code, self.event = int(Status.INVALID_INPUT), Event.HELD
+            return
+        found = solve(
+            self.platform, self._legs[0], tol=self._limits[0], singular=self._limits[1], workers=1
+        )
+        self._code = int(found.status)
+        if self._code > Status.OUTSIDE_WORKSPACE:
+            self.event = Event.HELD
+            return
+        self._agreeing = self._agreeing + 1 if self._agrees(found.pose) else 1
+        self._candidate = found.pose
+        if self._lost or self._agreeing >= self._confirm:
+            self._take(found.pose)
+            self._lost, self.event = False, Event.FOUND
+            return
+        self.event = Event.MODE_CHANGED if code == CROSSED else Event.JUMPED
+
+    def _agrees(self, pose: Pose) -> bool:
+        """Whether a pose is within one cycle's motion of the last one not believed."""
+        if self._candidate is None:
+            return False
+        shift, turn = self._candidate.distance(pose)
+        return bool(shift <= self._shift and turn <= self._turn)

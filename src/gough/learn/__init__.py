@@ -1,0 +1,1 @@
+"""Learned first guesses: data, graphs, networks, training, export, evaluation (PyTorch)."""

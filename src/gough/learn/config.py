@@ -1,0 +1,194 @@
+"""All that a training run is told, one frozen dataclass per concern.
+
+The same objects are the API, the command line (by tyro) and the file `config.json`.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
+
+from gough.errors import GoughError
+
+Kind = Literal["resmlp", "disgnet", "plain-mlp", "wise-mlp", "gcn", "graphmlp"]
+UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Which network."""
+
+    kind: Kind = "resmlp"
+    """Name of the network."""
+    options: dict[str, int] = field(default_factory=dict)
+    """The network's own options, such as `width 96`; its class says which there are."""
+
+
+@dataclass(frozen=True)
+class DataConfig:
+    """What it learns from."""
+
+    batch: int = 500
+    """Samples per step, over all processes together."""
+    samples: int | None = None
+    """Size of a fixed training set; none: every step draws fresh samples."""
+    same_assembly: bool = False
+    """Leave out poses beyond a singularity (det J not of home's sign)."""
+    test: int = 2000
+    """Samples that the metrics are computed on while training."""
+
+
+@dataclass(frozen=True)
+class LossConfig:
+    """What is made small."""
+
+    beta: float | None = None
+    """Weight of the rotation [platform unit]; none: 0.3 of the platform's size."""
+
+
+@dataclass(frozen=True)
+class OptimiserConfig:
+    """How."""
+
+    kind: Literal["soap", "adam", "adamw"] = "soap"
+    """Optimiser."""
+    lr: float = 5e-3
+    """Learning rate at its highest."""
+    weight_decay: float = 0.0
+    """Decoupled weight decay."""
+    schedule: Literal["falling", "constant"] = "falling"
+    """falling: after `hold` of the run the rate falls to zero at its end."""
+    power: float = 2.0
+    """The rate falls as this power of the time left; 1: along a line."""
+    warmup: int = 200
+    """Steps over which the rate rises from zero, at most 5 % of the run."""
+    hold: float = 0.3
+    """Share of the run for which the rate stays."""
+    average: float = 0.0
+    """Decay of an exponential average of the weights, which is then what is kept; 0: none."""
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """How long, where, and from which seed."""
+
+    budget: str | None = None
+    """Time to train, such as 90s, 30m or 2h; the schedule fits itself to it."""
+    clock: Literal["wall", "processor"] = "wall"
+    """What a budget counts: time, or this process's processor time (on a shared machine)."""
+    steps: int | None = None
+    """Number of steps, instead of a budget: such a run can be repeated bit for bit."""
+    epochs: int | None = None
+    """Number of passes over a fixed training set, instead of steps."""
+    seed: int = 0
+    """Of the weights at the start and of the samples."""
+    device: str = "auto"
+    """auto, cpu, cuda or cuda:1; auto takes a GPU if there is one."""
+    threads: int | None = None
+    """CPU threads; none: as many as PyTorch takes."""
+    dtype: Literal["float32", "float64"] = "float32"
+    """Of the weights."""
+    shards: int = 1
+    """Parts that a step's samples are drawn in; at least the number of processes."""
+    checkpoint_every: float = 120.0
+    """Seconds between checkpoints."""
+    log_every: float = 10.0
+    """Seconds between lines of metrics."""
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """A whole run."""
+
+    model: ModelConfig = ModelConfig()
+    data: DataConfig = DataConfig()
+    loss: LossConfig = LossConfig()
+    optimiser: OptimiserConfig = OptimiserConfig()
+    run: RunConfig = RunConfig()
+
+    def __post_init__(self) -> None:
+        given = [n for n in ("budget", "steps", "epochs") if getattr(self.run, n) is not None]
+        if len(given) > 1:
+            raise GoughError(
+                f"run: give one of budget, steps and epochs, not {' and '.join(given)}"
+            )
+        if self.run.budget is not None:
+            seconds(self.run.budget)
+        if self.run.epochs is not None and self.data.samples is None:
+            raise GoughError("run.epochs: fresh samples have no epochs; give data.samples or steps")
+        for name, value, least in (
+            ("data.batch", self.data.batch, 1),
+            ("run.shards", self.run.shards, 1),
+            ("run.steps", self.run.steps, 1),
+            ("run.epochs", self.run.epochs, 1),
+            ("data.samples", self.data.samples, self.data.batch),
+        ):
+            if value is not None and value < least:
+                raise GoughError(f"{name}: expected {least} or more, got {value}")
+        if not 0 <= self.optimiser.hold <= 1:
+            raise GoughError(f"optimiser.hold: expected 0 to 1, got {self.optimiser.hold}")
+
+    def total_steps(self) -> int | None:
+        """Steps of the run, None under a budget."""
+        if self.run.epochs is not None and self.data.samples is not None:
+            return self.run.epochs * (self.data.samples // self.data.batch)
+        return self.run.steps
+
+    def with_run(self, **changes: Any) -> TrainConfig:
+        """The same with other settings of the run; a new length replaces the old one."""
+        lengths = {"budget", "steps", "epochs"}
+        if lengths & changes.keys():
+            changes = dict.fromkeys(lengths) | changes
+        return replace(self, run=replace(self.run, **changes))
+
+    def to_json(self) -> str:
+        """As the text of `config.json`."""
+        return json.dumps(asdict(self), indent=2) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> TrainConfig:
+        """From the text of `config.json`.
+
+        Raises:
+            GoughError: not such a text.
+        """
+        try:
+            facts = json.loads(text)
+            parts = {"model": ModelConfig, "data": DataConfig, "loss": LossConfig}
+            parts |= {"optimiser": OptimiserConfig, "run": RunConfig}
+            return cls(**{name: kind(**facts[name]) for name, kind in parts.items()})
+        except (json.JSONDecodeError, KeyError, TypeError) as error:
+            raise GoughError(f"config.json: not a training configuration: {error}") from None
+
+
+def seconds(text: str) -> float:
+    """Seconds that "90s", "30m", "1.5h" or "45" stand for.
+
+    Raises:
+        GoughError: not a time above zero.
+    """
+    number, unit = (text[:-1], text[-1]) if text[-1:] in UNITS else (text, "s")
+    try:
+        value = float(number) * UNITS[unit]
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise GoughError(f"budget: expected a time such as 90s, 30m or 2h, got {text!r}")
+    return value
+
+
+PRESETS: dict[str, TrainConfig] = {
+    "default": TrainConfig(run=RunConfig(budget="10m")),
+    "disgnet": TrainConfig(
+        model=ModelConfig("disgnet"), data=DataConfig(batch=1000), run=RunConfig(budget="30m")
+    ),
+    "wide": TrainConfig(data=DataConfig(same_assembly=True), run=RunConfig(budget="15m")),
+    "paper": TrainConfig(
+        model=ModelConfig("disgnet"),
+        data=DataConfig(batch=4000, samples=400_000),
+        loss=LossConfig(beta=250.0),
+        optimiser=OptimiserConfig("adam", 1e-3, schedule="constant", warmup=0),
+        run=RunConfig(epochs=1200),
+    ),
+}

@@ -1,0 +1,108 @@
+"""A platform's inverse kinematics and pose algebra in torch, differentiable, on any device."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from gough.platform import Platform
+
+
+class TorchPlatform(nn.Module):
+    """Leg readings of poses relative to home, as `gough.leg_lengths` gives them.
+
+    Here a pose is (shift (..., 3) [unit], turn (..., 3, 3)): the position minus home's, in
+    base coordinates, and home's inverse rotation times the pose's own.
+    """
+
+    base: Tensor
+    arms: Tensor
+    origin: Tensor
+    home_rotation: Tensor
+    home_lengths: Tensor
+    axis_x: Tensor
+    axis_y: Tensor
+    branch: Tensor
+    arm: Tensor
+    rod: Tensor
+
+    def __init__(self, platform: Platform, dtype: torch.dtype = torch.float64) -> None:
+        super().__init__()
+        self.platform = platform
+        rotary = platform.rotary
+        facts = {
+            "base": platform.base,
+            "arms": platform.moving - platform.pivot_point,
+            "origin": platform.home.position + platform.pivot_point,
+            "home_rotation": platform.home.rotation,
+            "home_lengths": platform.home_lengths,
+        }
+        if rotary is not None:
+            facts |= {"axis_x": rotary.axis_x, "axis_y": rotary.axis_y, "branch": rotary.branch}
+            facts |= {"arm": rotary.arm_length, "rod": rotary.rod_length}
+        for name, value in facts.items():
+            self.register_buffer(name, torch.tensor(value, dtype=dtype), persistent=False)
+
+    def rotation(self, turn: Tensor) -> Tensor:
+        """The pose's rotation matrices (..., 3, 3)."""
+        return self.home_rotation @ turn
+
+    def struts(self, shift: Tensor, turn: Tensor) -> tuple[Tensor, Tensor]:
+        """Base joint to platform joint, and pivot to platform joint, each (..., 6, 3) [unit]."""
+        arms = self.arms @ self.rotation(turn).mT  # (..., 6, 3)
+        return arms + (self.origin + shift)[..., None, :] - self.base, arms
+
+    def legs(self, shift: Tensor, turn: Tensor) -> Tensor:
+        """Readings (..., 6); NaN where a motor cannot reach."""
+        struts, _ = self.struts(shift, turn)
+        if self.platform.rotary is not None:
+            return self._motor_angles(struts)
+        lengths = torch.linalg.vector_norm(struts, dim=-1)
+        if self.platform.legs == "length_change":
+            return lengths - self.home_lengths
+        return lengths
+
+    def _motor_angles(self, joint: Tensor) -> Tensor:
+        """See `gough.kinematics._motor_angles`."""
+        x, y = (joint * self.axis_x).sum(-1), (joint * self.axis_y).sum(-1)
+        reach = 2 * self.arm * torch.hypot(x, y)
+        wanted = (joint**2).sum(-1) + self.arm**2 - self.rod**2
+        angle = torch.atan2(y, x) + self.branch * torch.acos(wanted / reach)
+        return torch.atan2(torch.sin(angle), torch.cos(angle))
+
+    def assembly_sign(self, shift: Tensor, turn: Tensor) -> Tensor:
+        """Sign of det J times that at home, (...): see `gough.assembly_sign`."""
+        sign = self._sign(shift, turn)
+        no_turn = torch.eye(3, dtype=turn.dtype, device=turn.device)
+        return sign * self._sign(torch.zeros_like(self.origin), no_turn)
+
+    def _sign(self, shift: Tensor, turn: Tensor) -> Tensor:
+        struts, arms = self.struts(shift, turn)
+        rods = struts
+        if self.platform.rotary is not None:
+            angle = self._motor_angles(struts)[..., None]
+            rods = struts - self.arm * (angle.cos() * self.axis_x + angle.sin() * self.axis_y)
+        rows = torch.cat([rods, torch.linalg.cross(arms, rods)], dim=-1)  # (..., 6, 6)
+        return torch.linalg.slogdet(rows / torch.linalg.vector_norm(rods, dim=-1, keepdim=True))[0]
+
+
+def euler_to_matrix(angles: Tensor) -> Tensor:
+    """R = Rx(a) Ry(b) Rz(c), (..., 3, 3), of Euler angles (..., 3) [rad]."""
+    (sa, sb, sc), (ca, cb, cc) = angles.sin().unbind(-1), angles.cos().unbind(-1)
+    rows = [
+        cb * cc, -cb * sc, sb,
+        ca * sc + sa * sb * cc, ca * cc - sa * sb * sc, -sa * cb,
+        sa * sc - ca * sb * cc, sa * cc + ca * sb * sc, ca * cb,
+    ]  # fmt: skip
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+
+
+def quaternion_to_matrix(wxyz: Tensor) -> Tensor:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), scalar first."""
+    w, x, y, z = wxyz.unbind(-1)
+    rows = [
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    ]  # fmt: skip
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))

@@ -1,0 +1,93 @@
+"""Newton's method from many first guesses at once, to see where each of them ends.
+
+This is a yardstick, not the solver: it takes the guess as it is and has no second try.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from gough.checks import Array
+from gough.kinematics import equivalent_struts
+from gough.learn.geometry import quaternion_to_matrix
+from gough.platform import Platform
+from gough.pose import Pose
+
+STEPS = 30
+CHUNK = 50_000
+CONVERGED = 1e-10  # largest leg error of a converged row, of the platform's size
+SAME = 1e-6  # poses closer than this, of the platform's size or in rad, are the same
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where the rows ended: counts that add up to `count`."""
+
+    count: int
+    true: int
+    other: int
+    unconverged: int
+
+    @property
+    def share(self) -> float:
+        """Share of rows that ended at the true pose."""
+        return self.true / self.count
+
+
+def outcome(platform: Platform, guess: Pose, truth: Pose, legs: Array) -> Outcome:
+    """Refine guesses (N,) for readings (N, 6) and compare with the true poses (N,)."""
+    true = other = 0
+    for start in range(0, len(legs), CHUNK):
+        part = slice(start, start + CHUNK)
+        pose, converged = refine(platform, guess[part], legs[part])
+        away, angle = pose.distance(truth[part])
+        same = (away <= SAME * platform.size) & (angle <= SAME)
+        true += int(np.sum(converged & same))
+        other += int(np.sum(converged & ~same))
+    return Outcome(len(legs), true, other, len(legs) - true - other)
+
+
+@torch.no_grad()
+def refine(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, NDArray[np.bool_]]:
+    """Newton steps from guesses (N,): poses, and which rows (N,) converged within 30 steps.
+
+    A step moves by (v, w): t + v and exp(w) R. Its rows are n_i . v + (R p_i x n_i) . w.
+    """
+    base, lengths = (torch.tensor(x) for x in equivalent_struts(platform, legs))
+    arms0 = torch.tensor(platform.moving - platform.pivot_point)
+    t = torch.tensor(guess.position)
+    R = quaternion_to_matrix(torch.tensor(guess.wxyz))
+    left = torch.arange(len(t))
+    converged = torch.zeros(len(t), dtype=torch.bool)
+    pivot = torch.tensor(platform.pivot_point)
+    for _ in range(STEPS):
+        arms = arms0 @ R[left].mT
+        struts = arms + (t[left] + pivot)[:, None] - base[left]
+        now = torch.linalg.vector_norm(struts, dim=-1)
+        error = now - lengths[left]
+        done = error.abs().amax(-1) <= CONVERGED * platform.size
+        converged[left[done]] = True
+        todo = ~done & error.isfinite().all(-1)
+        if not todo.any():
+            break
+        left, arms, error = left[todo], arms[todo], error[todo]
+        n = struts[todo] / now[todo, :, None]
+        J = torch.cat([n, torch.linalg.cross(arms, n)], dim=-1)  # (N, 6, 6)
+        step = torch.linalg.solve_ex(J, -error)[0]
+        t[left] += step[:, :3]
+        R[left] = _exp(step[:, 3:]) @ R[left]
+    finite = t.isfinite().all(-1) & R.isfinite().all(-1).all(-1)
+    t[~finite], R[~finite] = 0, torch.eye(3, dtype=R.dtype)
+    return Pose.from_rotation(t.numpy(), R.numpy()), (converged & finite).numpy()
+
+
+def _exp(w: Tensor) -> Tensor:
+    """Rotation matrices (N, 3, 3) of rotation vectors (N, 3) [rad]."""
+    half = torch.linalg.vector_norm(w, dim=-1, keepdim=True) / 2
+    wxyz = torch.cat([half.cos(), w / 2 * torch.sinc(half / torch.pi)], dim=-1)
+    return quaternion_to_matrix(wxyz)

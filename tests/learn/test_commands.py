@@ -1,0 +1,79 @@
+"""What people type."""
+
+import json
+
+import pytest
+import tyro
+from learn.machines import reference
+
+from gough import GoughError
+from gough.learn import commands
+from gough.learn.config import PRESETS, TrainConfig
+
+
+def call(name: str, *arguments: str) -> int:
+    return tyro.cli(getattr(commands, name), args=list(arguments), prog=f"gough {name}")
+
+
+def test_dataset(tmp_path, capsys):
+    path = tmp_path / "data.csv"
+    assert call("dataset", "-p", "reference", "-o", str(path), "--count", "20") == 0
+    assert len(path.read_text().splitlines()) == 21
+    assert "the first 16 for training" in capsys.readouterr().out
+    wide = tmp_path / "wide.csv"
+    call("dataset", "-p", "reference", "-o", str(wide), "--count", "20", "--workspace", "100", "60",
+         "--same-assembly", "--layout", "paper")  # fmt: skip
+    assert len(wide.read_text().splitlines()[0].split(",")) == 13 + 144
+
+
+def test_train_prepare_takes_presets_and_options(tmp_path, capsys):
+    folder = tmp_path / "run"
+    call("train", "-p", "reference", "-o", str(folder), "--prepare", "--steps", "7", "--seed", "5",
+         "wide", "--optimiser.lr", "1e-3", "--model.options", "width", "32")  # fmt: skip
+    config = TrainConfig.from_json((folder / "config.json").read_text())
+    assert (config.run.steps, config.run.budget, config.run.seed) == (7, None, 5)
+    assert config.data.same_assembly
+    assert config.optimiser.lr == 1e-3
+    assert config.model.options == {"width": 32}
+    assert "torchrun" in capsys.readouterr().out
+
+
+def test_train_without_a_preset_takes_the_default(tmp_path):
+    call("train", "-p", "reference", "-o", str(tmp_path / "run"), "--prepare")
+    config = TrainConfig.from_json((tmp_path / "run" / "config.json").read_text())
+    assert config == PRESETS["default"]
+
+
+def test_train_own_platform_then_evaluate(tmp_path, capsys):
+    own = tmp_path / "my.toml"
+    platform = reference().with_workspace(20, 5)
+    platform.save(own)
+    run = tmp_path / "run"
+    call("train", "-p", str(own), "-o", str(run), "--steps", "30",
+         "default", "--model.options", "width", "8", "--data.test", "50")  # fmt: skip
+    out = tmp_path / "rows.json"
+    call("evaluate", str(run), "home", "-p", str(own), "--poses", "200", "--json", str(out))
+    text = capsys.readouterr().out
+    assert "First guesses" in text
+    rows = json.loads(out.read_text())
+    assert [row["name"] for row in rows] == [str(run), "home"]
+    assert rows[0]["outcome"]["true"] == 200
+    with pytest.raises(GoughError, match="holds a run already"):
+        call("train", "-p", str(own), "-o", str(run))
+
+
+def test_help_loads_no_torch():
+    import subprocess
+    import sys
+
+    code = """
+import sys, tyro
+from gough.learn import commands
+for name in ("dataset", "train", "evaluate"):
+    try:
+        tyro.cli(getattr(commands, name), args=["--help"], prog=name)
+    except SystemExit:
+        pass
+assert not {"torch", "onnx", "onnxruntime", "numba", "pyarrow"} & set(sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

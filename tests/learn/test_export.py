@@ -1,0 +1,185 @@
+"""From training to solving: files that say what they are, and refuse what they are not for."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from learn.machines import network, reference, tiny, with_model
+
+from gough import GoughError, Platform, leg_lengths
+from gough.fk.network import NetworkSeed, seal
+from gough.learn.checkpoint import save_tensors
+from gough.learn.export import WEIGHTS, export_run, facts_of, load_network, to_onnx
+from gough.learn.models import MODELS
+
+RECORD = {"seconds": 1.0, "steps": 20, "seed": 0}
+SIZES = {
+    "resmlp": {"width": 16, "depth": 2}, "disgnet": {"width": 16},
+    "plain-mlp": {"width": 16, "depth": 1}, "wise-mlp": {"width": 16, "depth": 1},
+    "gcn": {"width": 16, "layers": 1}, "graphmlp": {"width": 16, "blocks": 1, "hidden": 16},
+}  # fmt: skip
+
+
+def exported(kind, folder, platform=None):
+    platform = platform or reference()
+    model = network(kind, platform, **SIZES[kind])
+    model.cast(torch.float32)
+    export_run(model, with_model(tiny(), kind, **SIZES[kind]), RECORD, folder)
+    return model
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    exported("resmlp", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def legs():
+    return leg_lengths(reference(), reference().sample_poses(300, 4))
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_onnx_gives_what_torch_gives(tmp_path, kind, legs):
+    model = exported(kind, tmp_path)
+    seed = NetworkSeed(reference(), tmp_path)
+    assert seed.name == kind
+    shift, turn = (x.detach().numpy() for x in model(torch.tensor(seed_range(seed, legs))))
+    guess = seed.guess(legs)
+    np.testing.assert_allclose(guess.position - reference().home.position, shift, atol=1e-3)
+    np.testing.assert_allclose(guess.rotation, turn, atol=1e-4)
+    assert seed.guess(legs[:1]).batch == (1,)
+    assert seed.guess(legs[:0]).batch == (0,)
+
+
+def seed_range(seed, legs):
+    return np.clip(legs, *seed.leg_range.T)
+
+
+def test_chunks_do_not_show(run, legs, monkeypatch):
+    seed = NetworkSeed(reference(), run / "network.onnx")
+    whole = seed.guess(legs)
+    monkeypatch.setattr("gough.fk.network.CHUNK", 7)
+    np.testing.assert_allclose(seed.guess(legs).position, whole.position, atol=1e-4)
+
+
+def test_files_say_what_they_are(run):
+    seed = NetworkSeed(reference(), run)
+    model, facts = load_network(run, reference())
+    assert facts == seed.facts
+    assert facts["parameters"] == model.parameter_count()
+    assert facts["platform"] == reference().digest
+    assert facts["unit"] == "mm"
+    assert facts["record"] == RECORD
+    assert facts["config"]["model"] == {"kind": "resmlp", "options": SIZES["resmlp"]}
+
+
+def test_it_is_a_plain_onnx_file(run):
+    import onnx
+
+    model = onnx.load(str(run / "network.onnx"))
+    onnx.checker.check_model(model)
+    keys = {p.key: p.value for p in model.metadata_props}
+    assert set(keys) == {"gough", "gough.sha256"}
+    assert json.loads(keys["gough"])["kind"] == "resmlp"
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_a_damaged_file_is_refused_in_one_sentence(run, tmp_path_factory, data):
+    content = bytearray((run / "network.onnx").read_bytes())
+    if data.draw(st.booleans()):
+        content = content[: data.draw(st.integers(0, len(content) - 1))]
+    else:
+        content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("damaged") / "network.onnx"
+    path.write_bytes(content)
+    with pytest.raises(GoughError, match=r"network\.onnx: truncated, corrupt") as caught:
+        NetworkSeed(reference(), path)
+    assert "\n" not in str(caught.value)
+
+
+def test_other_files_are_refused(run, tmp_path):
+    path = tmp_path / "other.onnx"
+    path.write_bytes(seal(b"anything"))
+    with pytest.raises(GoughError, match="another format"):
+        NetworkSeed(reference(), path)
+    with pytest.raises(GoughError, match="No such file"):
+        NetworkSeed(reference(), tmp_path / "none")
+    _, facts = load_network(run, reference())
+    path.write_bytes(seal(b"not a graph\x0a\x05gough\x12" + length_and(json.dumps(facts))))
+    with pytest.raises(GoughError, match="onnxruntime cannot run"):
+        NetworkSeed(reference(), path)
+    truncated = tmp_path / WEIGHTS
+    truncated.write_bytes((run / WEIGHTS).read_bytes()[:-100])
+    with pytest.raises(GoughError, match="truncated, corrupt"):
+        load_network(truncated, reference())
+    save_tensors(truncated, {}, {"format": 0})
+    with pytest.raises(GoughError, match="another format"):
+        load_network(truncated, reference())
+
+
+def length_and(text: str) -> bytes:
+    size = len(text)
+    return bytes([size & 0x7F | 0x80, size >> 7 & 0x7F | 0x80, size >> 14]) + text.encode()
+
+
+def test_weights_of_another_platform_are_refused(run):
+    moved = replace(reference(), home=(0, 0, 601))
+    for other in (moved, reference().with_workspace(60, 30), Platform.load("rubin_camera")):
+        unit = "trained in 'mm'" if other.unit != "mm" else "weights of platform 'reference'"
+        with pytest.raises(GoughError, match=unit):
+            NetworkSeed(other, run)
+        with pytest.raises(GoughError, match="weights of platform 'reference'"):
+            load_network(run, other)
+    with pytest.raises(GoughError, match="trained in 'mm', but platform 'reference' is in 'm'"):
+        NetworkSeed(replace(reference(), unit="m"), run)
+
+
+def test_legs_outside_the_training_range_are_flagged_and_still_guessed(run, legs):
+    seed = NetworkSeed(reference(), run)
+    assert not seed.outside(legs[:20]).any()
+    strange = legs[:4].copy()
+    strange[1, 2] = 2 * strange[1, 2]
+    strange[3, 0] = np.nan
+    assert seed.outside(strange).tolist() == [False, True, False, True]
+    guess = seed.guess(strange[:3])
+    assert np.isfinite(guess.position).all()
+    assert np.isfinite(guess.wxyz).all()
+    assert platform_sized(guess.position)
+
+
+def platform_sized(position) -> bool:
+    return bool(np.linalg.norm(position - reference().home.position, axis=-1).max() < 600)
+
+
+def test_solving_needs_no_torch(run):
+    code = f"""
+import sys, gough
+from gough.fk.network import NetworkSeed
+platform = gough.Platform.load("reference")
+seed = NetworkSeed(platform, {str(run)!r})
+seed.guess(platform.home_legs[None])
+heavy = {{"torch", "onnx", "onnxscript", "safetensors"}} & set(sys.modules)
+assert not heavy, heavy
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+    code = "import sys, gough; assert not {'torch', 'onnxruntime', 'numba'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_onnx_of_a_double_network_keeps_its_digits(legs):
+    model = network("resmlp", reference(), **SIZES["resmlp"])
+    import onnxruntime
+
+    content = to_onnx(model, facts_of(model, tiny(), RECORD))
+    session = onnxruntime.InferenceSession(content)
+    raw = np.asarray(session.run(None, {"legs": legs})[0])
+    np.testing.assert_allclose(raw, model.raw(torch.tensor(legs)).detach(), rtol=1e-9, atol=1e-10)

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+import torch
+from learn.machines import network, random_platform, reference, with_some_workspace
+
+from gough import GoughError, Platform, leg_lengths
+from gough.learn.loss import default_beta, pose_loss, training_loss
+from gough.learn.models import MODELS, Scaling, build
+from gough.learn.models.polynomial import PolynomialGuess
+from gough.learn.sampling import Stream
+
+COUNTS = {
+    "resmlp": 117_383, "disgnet": 132_780, "plain-mlp": 128_662, "wise-mlp": 120_076,
+    "gcn": 130_000, "graphmlp": 350_000,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_parameter_counts_are_the_papers(kind):
+    platform = reference()
+    count = build(kind, platform, Scaling.of(platform)).parameter_count()
+    assert count == pytest.approx(COUNTS[kind], rel=0.03)
+    if kind != "graphmlp":
+        assert round(count / 1e6, 2) <= 0.13
+
+
+def test_the_best_network_is_no_larger_than_allowed():
+    platform = reference()
+    assert build("resmlp", platform, Scaling.of(platform)).parameter_count() <= 130_000
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_networks_give_poses_and_start_near_home(kind):
+    platform = random_platform(np.random.default_rng(1))
+    torch.manual_seed(0)
+    model = build(kind, platform, Scaling.of(platform)).eval()
+    legs = torch.tensor(leg_lengths(platform, platform.sample_poses(50, 3)))
+    shift, turn = model(legs)
+    assert shift.shape == (50, 3)
+    assert shift.dtype == turn.dtype == torch.float64
+    eye = torch.eye(3, dtype=torch.float64)
+    torch.testing.assert_close(turn @ turn.mT, eye.expand_as(turn), atol=1e-5, rtol=0)
+    torch.testing.assert_close(torch.linalg.det(turn), torch.ones(50).double(), atol=1e-5, rtol=0)
+    angle = ((turn.diagonal(dim1=1, dim2=2).sum(-1) - 1) / 2).clamp(-1, 1).acos()
+    assert angle.max() < 1
+    assert shift.abs().max() < 60
+
+
+@pytest.mark.parametrize("kind", ["resmlp", "disgnet", "gcn"])
+@pytest.mark.parametrize("name", Platform.catalog())
+def test_networks_take_every_kind_of_platform(kind, name):
+    platform = with_some_workspace(Platform.load(name))
+    model = network(kind, platform, width=8)
+    batch = Stream(platform).batch(5, 0)
+    loss = training_loss(model, batch.legs, batch, default_beta(platform))
+    loss.backward()
+    assert torch.isfinite(loss)
+    assert all(torch.isfinite(p.grad).all() for p in model.parameters() if p.grad is not None)
+
+
+def test_unknown_names_and_options_are_named():
+    platform = reference()
+    with pytest.raises(GoughError, match="resmlp, disgnet"):
+        build("transformer", platform, Scaling.of(platform))
+    with pytest.raises(GoughError, match="heads"):
+        build("resmlp", platform, Scaling.of(platform), heads=3)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_the_unit_of_length_changes_nothing(scale):
+    platform = reference()
+    other = Platform(
+        scale * platform.base, scale * platform.moving, home=scale * platform.home.position
+    ).with_workspace(50 * scale, 30)
+    legs = torch.tensor(leg_lengths(platform, platform.sample_poses(9, 3)))
+    for kind in ("resmlp", "disgnet"):
+        a, b = network(kind, platform), network(kind, other)
+        torch.testing.assert_close(a.raw(legs), b.raw(scale * legs), rtol=1e-9, atol=1e-9)
+    assert default_beta(other) == pytest.approx(scale * default_beta(platform))
+
+
+def test_the_loss_is_the_papers():
+    batch = Stream(reference()).batch(3, 0)
+    turn = torch.eye(3, dtype=torch.float64).expand(3, 3, 3)
+    shift = torch.zeros(3, 3, dtype=torch.float64)
+    turned = np.linalg.norm(np.eye(3) - batch.turn.numpy(), "fro", axis=(1, 2))
+    expected = np.mean(np.linalg.norm(batch.shift.numpy(), axis=1) + 250 * turned)
+    assert float(pose_loss(shift, turn, batch, 250.0)) == pytest.approx(expected)
+    assert float(pose_loss(batch.shift, batch.turn, batch, 250.0)) == 0
+
+
+def test_polynomials_get_better_with_their_degree():
+    platform = reference()
+    pose = platform.sample_poses(2000, 5)
+    legs = leg_lengths(platform, pose)
+    errors = []
+    for degree in (0, 1, 3, 4):
+        guess = PolynomialGuess(platform, degree)
+        assert guess.parameters == 12 * [1, 7, 28, 84, 210][degree]
+        errors.append(guess.guess(legs).distance(pose)[0].mean())
+    assert errors == sorted(errors, reverse=True)
+    assert errors[2] == pytest.approx(1.5, rel=0.1)  # measured when the project was planned
+    assert errors[3] == pytest.approx(0.75, rel=0.1)
+    with pytest.raises(GoughError, match="0 to 8"):
+        PolynomialGuess(platform, 9)

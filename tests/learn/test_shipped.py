@@ -1,0 +1,81 @@
+"""The weights that come with the package: what they reach, and which platforms they are for."""
+
+import numpy as np
+import pytest
+from learn.machines import reference
+
+from gough import GoughError, Platform, leg_lengths
+from gough.fk.network import NetworkSeed, shipped_names
+from gough.learn.evaluate import HELD_OUT, default_names, evaluate, held_out, table, to_json
+from gough.learn.speed import measure_speed
+
+
+def test_names():
+    assert shipped_names(reference()) == ["disgnet", "resmlp"]
+    assert shipped_names(reference().with_workspace(100, 60)) == ["resmlp"]
+    assert default_names(reference())[0] == "home"
+    assert shipped_names(Platform.load("rubin_camera")) == []
+    with pytest.raises(GoughError, match="gough train"):
+        NetworkSeed.shipped(Platform.load("rubin_camera"))
+    with pytest.raises(GoughError, match="there are: disgnet, resmlp"):
+        NetworkSeed.shipped(reference(), "gcn")
+
+
+@pytest.mark.parametrize(
+    ("name", "trans", "rot", "ik", "worst"),
+    [("resmlp", 0.03, 0.01, 0.05, 10), ("disgnet", 0.30, 0.1, 0.5, 100)],
+)
+def test_they_reach_what_is_required(name, trans, rot, ik, worst):
+    row = evaluate(reference(), [name], poses=5000)[0]
+    assert row.metrics.trans_mean <= trans
+    assert row.metrics.rot_mean <= rot
+    assert row.metrics.ik_mean <= ik
+    assert row.metrics.trans_worst <= worst
+    assert row.outcome.true == 5000
+    assert row.parameters is not None
+    assert row.parameters <= 135_000
+
+
+def test_the_wide_workspace():
+    wide = reference().with_workspace(100, 60)
+    rows = evaluate(wide, ["home", "resmlp"], poses=10_000, same_assembly=True)
+    assert rows[1].outcome.share >= 0.999
+    assert rows[0].outcome.share < 0.99
+
+
+def test_rows_are_shown_and_written():
+    from rich.console import Console
+
+    rows = evaluate(reference(), ["home", "polynomial-2", "resmlp"], poses=500)
+    console = Console(width=220)
+    with console.capture() as shown:
+        console.print(table(reference(), rows))
+    text = shown.get()
+    assert "polynomial-2" in text
+    assert "336" in text
+    assert '"trans_mean"' in to_json(rows)
+
+
+def test_held_out_poses_are_always_the_same():
+    a, legs = held_out(reference(), 100, False)
+    np.testing.assert_array_equal(legs, held_out(reference(), 100, False)[1])
+    np.testing.assert_allclose(leg_lengths(reference(), a), legs)
+    assert HELD_OUT != 0
+
+
+def test_names_that_stand_for_nothing():
+    with pytest.raises(GoughError, match="degree"):
+        evaluate(reference(), ["polynomial-x"], poses=10)
+    with pytest.raises(GoughError, match="no network 'nonsense'"):
+        evaluate(reference(), ["nonsense"], poses=10)
+    with pytest.raises(GoughError, match="no such run's folder"):
+        evaluate(reference(), ["runs/none"], poses=10)
+
+
+def test_the_structured_form_is_much_faster_than_the_dense_one():
+    speed = measure_speed(reference(), batch=100, repeats=1)
+    assert speed.structured.run < speed.dense.run / 5  # 30 to 150 where nothing else runs
+    assert speed.tables.train < speed.dense.train / 5
+    lines = speed.lines()
+    assert len(lines) == 6
+    assert "times dense" in lines[1]

@@ -1,0 +1,77 @@
+"""The same machine in MuJoCo: legs are spatial tendons between two sites, motor arms are hinges.
+
+MuJoCo measures lengths and derives its own tendon Jacobian; nothing of gough is used but the
+platform's numbers. The moving body's frame has its origin at the pivot, so that the velocity of a
+free joint is (velocity of the pivot in world axes, angular velocity in body axes).
+"""
+
+# MuJoCo ships no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from support import Floats
+
+from gough import Platform, Pose
+
+
+def measure(platform: Platform, pose: Pose, angles: Floats | None = None) -> tuple[Floats, Floats]:
+    """Tendon lengths (6,) and their Jacobian (6, 6), or (6, 12) with arms at `angles` in front.
+
+    The last six columns are for the twist of `gough.jacobian`, in base axes.
+    """
+    model = mujoco.MjModel.from_xml_string(_mjcf(platform))
+    data = mujoco.MjData(model)
+    arms = [] if angles is None else angles
+    data.qpos[:] = [*arms, *(pose.position + platform.pivot_point), *pose.wxyz]
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_tendon(model, data)
+    rows = _dense_tendon_jacobian(model, data)
+    rows[:, -3:] = rows[:, -3:] @ pose.rotation.T  # angular velocity: body axes to base axes
+    return data.ten_length.copy(), rows
+
+
+def _mjcf(platform: Platform) -> str:
+    base, moving = platform.base, platform.moving - platform.pivot_point
+    if platform.rotary is None:
+        fixed = "".join(f'<site name="b{i}" pos="{_text(p)}"/>' for i, p in enumerate(base))
+    else:
+        fixed = "".join(_arm(platform, i) for i in range(6))
+    sites = "".join(f'<site name="p{i}" pos="{_text(p)}"/>' for i, p in enumerate(moving))
+    tendons = "".join(
+        f'<spatial name="t{i}"><site site="b{i}"/><site site="p{i}"/></spatial>' for i in range(6)
+    )
+    mass = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    return (
+        '<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>'
+        f'{fixed}<body name="moving"><freejoint/>{mass}{sites}</body>'
+        f"</worldbody><tendon>{tendons}</tendon></mujoco>"
+    )
+
+
+def _arm(platform: Platform, i: int) -> str:
+    """A hinge whose body's x axis points along the arm; the site is the arm's tip."""
+    arms = platform.rotary
+    assert arms is not None
+    axes = f"{_text(arms.axis_x[i])} {_text(arms.axis_y[i])}"
+    return (
+        f'<body pos="{_text(platform.base[i])}" xyaxes="{axes}"><joint type="hinge" axis="0 0 1"/>'
+        f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        f'<site name="b{i}" pos="{arms.arm_length!r} 0 0"/></body>'
+    )
+
+
+def _text(vector: Floats) -> str:
+    return " ".join(repr(float(v)) for v in vector)
+
+
+def _dense_tendon_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
+    rows = np.zeros((model.ntendon, model.nv))
+    for i in range(model.ntendon):
+        start, count = model.ten_J_rowadr[i], model.ten_J_rownnz[i]
+        entries = slice(start, start + count)
+        rows[i, model.ten_J_colind[entries]] = data.ten_J[entries]
+    return rows

@@ -1,0 +1,176 @@
+"""Every public name resolves, importing stays light, and the documents do what they say."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import documents
+import pytest
+
+import gough
+
+HEAVY = ("torch", "numba", "pyarrow", "viser", "matplotlib", "pandas", "scipy", "onnxruntime",
+         "mujoco", "rich", "tyro", "sympy")  # fmt: skip
+
+
+def fresh_python(code: str) -> str:
+    """What a new interpreter prints."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+# ---- names ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", gough.__all__)
+def test_every_public_name_resolves(name: str) -> None:
+    value = getattr(gough, name)
+    assert value is not None
+    assert name in dir(gough)
+    if name != "__version__":
+        assert value.__doc__, f"{name} has no docstring"
+
+
+def test_public_names_are_those_that_type_checkers_see() -> None:
+    """The imports under TYPE_CHECKING, run here, give the very objects that users get."""
+    text = Path(gough.__file__).read_text("utf-8")
+    block = text.split("if TYPE_CHECKING:\n")[1].split("\n\n")[0]
+    seen: dict = {}
+    exec("if True:\n" + block, seen)
+    seen.pop("__builtins__")
+    assert seen.keys() | {"__version__"} == set(gough.__all__)
+    assert all(getattr(gough, name) is value for name, value in seen.items())
+
+
+def test_every_public_name_is_in_the_documents() -> None:
+    page = (documents.ROOT / "docs" / "api.md").read_text("utf-8")
+    missing = [n for n in gough.__all__ if f":: gough.{n}\n" not in page and n != "__version__"]
+    assert not missing, "docs/api.md lacks an entry for each of these"
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'gough' has no attribute 'sovle'"):
+        gough.sovle  # noqa: B018 # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_star_import_gives_the_public_names() -> None:
+    names: dict = {}
+    exec("from gough import *", names)
+    assert set(gough.__all__) <= names.keys()
+
+
+# ---- weight ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import gough",
+        "import gough; p = gough.Platform.load('reference'); gough.leg_lengths(p, p.home)",
+        "import gough as g; p = g.Platform.load('reachy_mini'); g.jacobian(p, p.sample_poses(3))",
+    ],
+)
+def test_light_work_loads_no_heavy_library(code: str) -> None:
+    loaded = fresh_python(f"{code}\nimport sys; print(*sys.modules)").split()
+    assert "gough" in loaded
+    assert not set(HEAVY) & set(loaded)
+
+
+def test_import_alone_loads_no_numpy() -> None:
+    assert "numpy" not in fresh_python("import gough, sys; print(*sys.modules)").split()
+
+
+# ---- the project's own word -----------------------------------------------------------
+
+
+def test_the_package_says_that_it_is_typed() -> None:
+    assert (Path(gough.__file__).parent / "py.typed").is_file()
+
+
+def test_the_changelog_tells_of_this_version() -> None:
+    assert f"## {gough.__version__}" in (documents.ROOT / "CHANGELOG.md").read_text("utf-8")
+
+
+def test_the_core_does_not_ask_for_torch() -> None:
+    project = tomllib.loads((documents.ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    assert not any(need.startswith("torch") for need in project["dependencies"])
+    assert "torch==2.13.0" in project["optional-dependencies"]["dev"]
+
+
+# ---- documents ------------------------------------------------------------------------
+
+
+WITH_PYTHON = [p for p in documents.PAGES if documents.python_blocks(p.read_text("utf-8"))]
+
+
+@pytest.mark.parametrize("page", WITH_PYTHON, ids=lambda page: page.name)
+def test_documents_run_and_print_what_they_say(page: Path) -> None:
+    blocks = documents.python_blocks(page.read_text("utf-8"))
+    with documents.playground():
+        printed_by_block = documents.run(page, blocks)
+    for block, printed in zip(blocks, printed_by_block, strict=True):
+        if block.output is not None:
+            told = f"{page.name}:{block.line} printed\n{printed}\nbut the page says\n{block.output}"
+            assert documents.same_output(printed, block.output), told
+
+
+PAGE = """
+# Page
+
+```python
+x = 1 / 3
+print("third", x)
+```
+
+```text
+third 0.333333333
+```
+
+<!-- not run: needs a machine -->
+```python
+raise SystemExit
+```
+
+<!-- another comment -->
+```python
+print(x, x)
+```
+Words between.
+```text
+not an output
+```
+
+```bash
+false
+```
+"""
+
+
+def test_the_harness_runs_python_and_pairs_it_with_its_output() -> None:
+    blocks = documents.python_blocks(PAGE)
+    assert [b.line for b in blocks] == [5, 20]
+    assert [b.output for b in blocks] == ["third 0.333333333\n", None]
+    third, twice = documents.run(Path("page.md"), blocks)
+    assert third == f"third {1 / 3}\n"
+    assert twice == f"{1 / 3} {1 / 3}\n"
+
+
+@pytest.mark.parametrize(
+    ("printed", "expected", "same"),
+    [
+        ("a 0.3333333333 b", "a 0.33333333 b", True),
+        ("a 0.3333333333 b", "a 0.3334 b", False),
+        ("[1.  2.]", "[1.0 2.0]", True),
+        ("a b c", "a c", False),
+        ("a b c d", "a ... d", True),
+        ("a b c d", "a ... e", False),
+        ("a", "a ...", True),
+        ("1e-17", "0", True),
+        ("converged: 3", "not_converged: 3", False),
+    ],
+)
+def test_outputs_are_compared_word_by_word(printed: str, expected: str, same: bool) -> None:
+    assert documents.same_output(printed, expected) == same
