@@ -45,6 +45,28 @@ def test_bounds_hold_in_ball_arithmetic(name):
         assert proof.radius[k] > 0.999 * solved.radius
 
 
+def test_rounding_is_accounted_for_far_from_the_origin():
+    """A machine 1e5 sizes away: struts lose five digits, and the error must say so."""
+    balls = pytest.importorskip("gough.modes.balls")
+    near = gough.Platform.load("reference")
+    far = np.array([1e8, -7e7, 3e7]) / 3
+    platform = gough.Platform(near.base + far, near.moving, home=near.home.position + far)
+    pose = near.sample_poses(20, 6)
+    pose = gough.Pose(pose.position + far, pose.wxyz)
+    legs = gough.leg_lengths(near, near.sample_poses(20, 6))
+    proof = gough.certify(platform, legs, pose)
+    assert proof.certified.all()
+    exact = [[balls.acb(v) for v in row] for row in platform.moving]
+    for k in range(20):
+        squares = [balls.acb(v) ** 2 for v in legs[k]]
+        solved = balls.prove(
+            platform.base, platform.moving, squares, pose.wxyz[k], pose.position[k]
+        )
+        given = [[balls.acb(v) for v in part] for part in (pose.wxyz[k], pose.position[k])]
+        gaps = balls.relative(exact, *given, solved.e, solved.t)
+        assert all(gap < float(proof.error[k]) for gap in gaps)
+
+
 def test_interval_newton_agrees():
     """The Jacobian over the whole box, entry by entry in intervals: a different bound."""
     balls = pytest.importorskip("gough.modes.balls")
