@@ -531,3 +531,48 @@ def test_the_papers_two_stages():
         gough.solve(gough.Platform.load("rubin_camera"), np.zeros(6), seed="disgnet")
     with pytest.raises(gough.GoughError, match="runs/none: no such run's folder"):
         gough.solve(platform, legs, seed="runs/none")
+
+
+# ---- what else could it be ------------------------------------------------------------
+
+
+def test_ambiguous_readings_are_called_so():
+    """In a wide workspace two poses on home's side of the singularities can share readings."""
+    platform = gough.Platform.load("reference").with_workspace(100, 60)
+    pose, legs = _legs(platform, 400, seed=22)
+    legs = legs[gough.assembly_sign(platform, pose) > 0]
+    modes = gough.assembly_modes(platform, legs)
+    rows = np.flatnonzero(gough.choose_mode(modes).ambiguous)
+    sample = np.concatenate([rows[:3], np.setdiff1d(np.arange(30), rows)])
+    plain = gough.solve(platform, legs[sample])
+    asked = gough.solve(platform, legs[sample], ambiguous=True)
+    expected = np.isin(sample, rows) & plain.usable
+    np.testing.assert_array_equal(asked.status == Status.AMBIGUOUS, expected)
+    narrow = gough.Platform.load("reference")
+    _, legs = _legs(narrow, 50)
+    assert np.all(gough.solve(narrow, legs, ambiguous=True).status == Status.CONVERGED)
+    assert np.all(gough.solve(narrow, legs * np.nan, ambiguous=True).status == 6)
+
+
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_the_workspace_is_the_one_stated(axis, side):
+    """A lopsided box about a turned home: the compiled test agrees with the plain one."""
+    turn = gough.Pose.from_euler(np.zeros(3), [0.1, -0.05, 0.4]).wxyz
+    plain = gough.Platform.load("reference")
+    box = gough.Workspace([[-20, 35], [-30, 15], [-10, 40]], [[-8, 14], [-12, 5], [-20, 9]])
+    platform = gough.Platform(
+        plain.base, plain.moving, gough.Pose([5, -8, 590], turn), workspace=box
+    )
+    limits = np.concatenate([box.translation, np.radians(box.rotation_deg)])
+    center, half = limits.mean(axis=1), np.diff(limits, axis=1)[:, 0] / 2
+    x = np.tile(center, (4, 1))
+    x[:, axis] += side * half[axis] * np.array([0.5, 0.99, 1.01, 1.5])
+    home = gough.Pose(np.zeros(3), turn)
+    pose = gough.Pose(
+        platform.home.position + x[:, :3],
+        (home @ gough.Pose.from_euler(np.zeros(3), x[:, 3:])).wxyz,
+    )
+    np.testing.assert_array_equal(platform.in_workspace(pose), [True, True, False, False])
+    solution = gough.solve(platform, gough.leg_lengths(platform, pose), seed=pose)
+    np.testing.assert_array_equal(solution.status, [0, 0, 3, 3])

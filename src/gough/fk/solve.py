@@ -9,7 +9,7 @@ from gough.checks import Array, as_batch
 from gough.fk import bulk, geometry
 from gough.fk.polynomial import Polynomial
 from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed, find_seed
-from gough.fk.status import Solution, Status
+from gough.fk.status import USABLE, Solution, Status
 from gough.kinematics import pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose
@@ -26,6 +26,7 @@ def solve(
     singular: float = geometry.SINGULAR,
     leg_noise: ArrayLike | None = None,
     certify: bool = False,
+    ambiguous: bool = False,
     workers: int | None = None,
 ) -> Solution:
     """Poses that have the given leg readings, each with what is known about it.
@@ -51,6 +52,9 @@ def solve(
             (6, 6): asks for `Solution.covariance`.
         certify: prove each usable pose: where it succeeds, CONVERGED becomes CERTIFIED and
             `Solution.radius` says how far around no other pose has these legs.
+        ambiguous: look for every other pose with the same readings (see `assembly_modes`; it
+            takes hundreds of times as long) and call a usable row AMBIGUOUS where one of them
+            could be the machine's too: in workspace and stroke, with home's sign of det J.
         workers: threads; all cores unless given.
 
     Returns:
@@ -71,6 +75,8 @@ def solve(
         _finish(platform, flat, rows, start, isinstance(found, PoseSeed), settings)
         _blank_invalid(rows)
     radius = _certify(platform, flat, rows, settings) if certify else None
+    if ambiguous:
+        _doubt(platform, flat, rows)
     return _solution(platform, rows, radius, readings.shape[:-1], leg_noise)
 
 
@@ -133,6 +139,15 @@ def _certify(platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Se
     proven = radius > 0
     rows.status[proven & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
     return radius
+
+
+def _doubt(platform: Platform, legs: Array, rows: bulk.Rows) -> None:
+    """Call usable rows ambiguous whose readings more than one pose could have."""
+    from gough.modes.choose import ambiguous
+
+    usable = np.flatnonzero(np.isin(rows.status, USABLE))
+    if len(usable):
+        rows.status[usable[ambiguous(platform, legs[usable])]] = Status.AMBIGUOUS
 
 
 def _solution(

@@ -24,6 +24,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 5
     INVALID_INPUT = 6
     CERTIFIED = 7
+    AMBIGUOUS = 8
 
     @property
     def text(self) -> str:
@@ -74,6 +75,11 @@ _TEXTS = {
     Status.CERTIFIED: (
         "Proven: exactly one pose with these leg readings lies within the stated radius of this "
         "one."
+    ),
+    Status.AMBIGUOUS: (
+        "Another pose has these leg readings too, inside the workspace and the stroke and on "
+        "home's side of the singularities: readings alone cannot tell which is the machine's; use "
+        "a seed near the true pose, or another sensor (see gough.choose_mode)."
     ),
 }
 
