@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -537,21 +538,20 @@ def test_the_papers_two_stages():
 
 
 def test_ambiguous_readings_are_called_so():
-    """In a wide workspace two poses on home's side of the singularities can share readings."""
-    platform = gough.Platform.load("reference").with_workspace(100, 60)
-    pose, legs = _legs(platform, 400, seed=22)
-    legs = legs[gough.assembly_sign(platform, pose) > 0]
-    modes = gough.assembly_modes(platform, legs)
-    rows = np.flatnonzero(gough.choose_mode(modes).ambiguous)
-    sample = np.concatenate([rows[:3], np.setdiff1d(np.arange(30), rows)])
-    plain = gough.solve(platform, legs[sample])
-    asked = gough.solve(platform, legs[sample], ambiguous=True)
-    expected = np.isin(sample, rows) & plain.usable
-    np.testing.assert_array_equal(asked.status == Status.AMBIGUOUS, expected)
-    narrow = gough.Platform.load("reference")
-    _, legs = _legs(narrow, 50)
-    assert np.all(gough.solve(narrow, legs, ambiguous=True).status == Status.CONVERGED)
-    assert np.all(gough.solve(narrow, legs * np.nan, ambiguous=True).status == 6)
+    """Dietmaier's forty poses, some of which only a stated workspace could tell from home."""
+    stated = gough.Platform.load("dietmaier")
+    free = replace(stated, workspace=None)
+    count = int(gough.choose_mode(gough.assembly_modes(free, free.home_legs)).count)
+    assert count > 1
+    assert gough.solve(free, free.home_legs).status == Status.CONVERGED
+    solution = gough.solve(free, [free.home_legs, np.full(6, np.nan)], ambiguous=True)
+    np.testing.assert_array_equal(solution.status, [Status.AMBIGUOUS, Status.INVALID_INPUT])
+    assert not np.any(solution.usable)
+    assert gough.solve(stated, stated.home_legs, ambiguous=True).status == Status.CONVERGED
+    reference = gough.Platform.load("reference")
+    _, legs = _legs(reference, 50)
+    solution = gough.solve(reference, legs, ambiguous=True, certify=True)
+    assert np.all(solution.status == Status.CERTIFIED)
 
 
 @pytest.mark.parametrize("axis", range(6))
