@@ -143,7 +143,7 @@ def table(platform: Platform, rows: Sequence[Row]):
     columns = (
         "first guess", "numbers", "trained s", "seed", f"E-trans {unit}", "median", "worst",
         f"<{THRESHOLDS[1]:g} {unit} %", "E-rot deg", "worst deg", "E-rot paper's", "E-ik",
-        "Newton: true %", "other", "not conv.", "1000 guesses ms",
+        "Newton: true %", "other", "twins", "not conv.", "1000 guesses ms",
     )  # fmt: skip
     for i, column in enumerate(columns):
         out.add_column(column, justify="left" if i == 0 else "right", no_wrap=i == 0)
@@ -154,6 +154,7 @@ def table(platform: Platform, rows: Sequence[Row]):
 
 def _cells(row: Row) -> list[str]:
     m, o = row.metrics, row.outcome
+    ends = [f"{100 * o.share:.4f}", str(o.other), str(o.twins), str(o.unconverged)]
     name = Path(row.name).name if "/" in row.name else row.name
     optional = [
         "-" if v is None else f"{v:{spec}}"
@@ -163,8 +164,7 @@ def _cells(row: Row) -> list[str]:
     turns = [m.rot_mean, m.rot_worst, m.rot_frobenius, m.ik_mean]
     return [
         name, *optional, *(f"{v:.4g}" for v in errors), f"{100 * m.trans_within[1]:.2f}",
-        *(f"{v:.4g}" for v in turns), f"{100 * o.share:.4f}", str(o.other), str(o.unconverged),
-        f"{1e3 * row.per_thousand:.2f}",
+        *(f"{v:.4g}" for v in turns), *ends, f"{1e3 * row.per_thousand:.2f}",
     ]  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from gough.checks import Array
-from gough.kinematics import equivalent_struts
+from gough.kinematics import assembly_sign, equivalent_struts
 from gough.learn.geometry import quaternion_to_matrix
 from gough.platform import Platform
 from gough.pose import Pose
@@ -26,11 +26,20 @@ SAME = 1e-6  # poses closer than this, of the platform's size or in rad, are the
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the rows ended: counts that add up to `count`."""
+    """Where the rows ended: `true`, `other` and `unconverged` add up to `count`.
+
+    Attributes:
+        true: at the true pose.
+        other: at another pose with the same readings.
+        twins: those of `other` whose pose is in the workspace too, with det J of home's sign:
+            the readings alone cannot tell which of the two was meant.
+        unconverged: nowhere within 30 steps.
+    """
 
     count: int
     true: int
     other: int
+    twins: int
     unconverged: int
 
     @property
@@ -41,15 +50,18 @@ class Outcome:
 
 def outcome(platform: Platform, guess: Pose, truth: Pose, legs: Array) -> Outcome:
     """Refine guesses (N,) for readings (N, 6) and compare with the true poses (N,)."""
-    true = other = 0
+    true = other = twins = 0
     for start in range(0, len(legs), CHUNK):
         part = slice(start, start + CHUNK)
         pose, converged = refine(platform, guess[part], legs[part])
         away, angle = pose.distance(truth[part])
         same = (away <= SAME * platform.size) & (angle <= SAME)
         true += int(np.sum(converged & same))
-        other += int(np.sum(converged & ~same))
-    return Outcome(len(legs), true, other, len(legs) - true - other)
+        elsewhere = pose[converged & ~same]
+        other += len(elsewhere)
+        admissible = platform.in_workspace(elsewhere) & (assembly_sign(platform, elsewhere) > 0)
+        twins += int(np.sum(admissible))
+    return Outcome(len(legs), true, other, twins, len(legs) - true - other)
 
 
 @torch.no_grad()
