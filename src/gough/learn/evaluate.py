@@ -93,7 +93,13 @@ def _seed(platform: Platform, name: str, same_assembly: bool) -> tuple:
         return fitted, fitted.parameters, fitted.seconds, 0
     seed = find_network(platform, name)
     record = seed.facts["record"]
-    return seed, seed.facts["parameters"], record["seconds"], record["seed"]
+    return seed, seed.facts["parameters"], training_time(record), record["seed"]
+
+
+def training_time(record: dict) -> float:
+    """Seconds of a run and of those before it, whose weights it started from."""
+    before = record.get("started_from")
+    return record["seconds"] + (training_time(before) if before else 0.0)
 
 
 def per_thousand(seed: Seed, legs: Array, repeats: int = 7) -> float:

@@ -18,10 +18,10 @@ from gough.learn.geometry import quaternion_to_matrix
 from gough.platform import Platform
 from gough.pose import Pose
 
-STEPS = 30
+STEPS = 60
 CHUNK = 50_000
-CONVERGED = 1e-10  # largest leg error of a converged row, of the platform's size
-SAME = 1e-6  # poses closer than this, of the platform's size or in rad, are the same
+CONVERGED = 1e-12  # largest leg error of a converged row, of the platform's size
+SAME = 1e-5  # poses closer than this, of the platform's size or in rad, are the same
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Outcome:
         other: at another pose with the same readings.
         twins: those of `other` whose pose is in the workspace too, with det J of home's sign:
             the readings alone cannot tell which of the two was meant.
-        unconverged: nowhere within 30 steps.
+        unconverged: nowhere within 60 steps.
     """
 
     count: int
@@ -66,7 +66,7 @@ def outcome(platform: Platform, guess: Pose, truth: Pose, legs: Array) -> Outcom
 
 @torch.no_grad()
 def refine(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, NDArray[np.bool_]]:
-    """Newton steps from guesses (N,): poses, and which rows (N,) converged within 30 steps.
+    """Newton steps from guesses (N,): poses, and which rows (N,) converged within 60 steps.
 
     A step moves by (v, w): t + v and exp(w) R. Its rows are n_i . v + (R p_i x n_i) . w.
     """
