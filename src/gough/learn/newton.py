@@ -54,14 +54,19 @@ def outcome(platform: Platform, guess: Pose, truth: Pose, legs: Array) -> Outcom
     for start in range(0, len(legs), CHUNK):
         part = slice(start, start + CHUNK)
         pose, converged = refine(platform, guess[part], legs[part])
-        away, angle = pose.distance(truth[part])
-        same = (away <= SAME * platform.size) & (angle <= SAME)
+        same = same_pose(platform, pose, truth[part])
         true += int(np.sum(converged & same))
         elsewhere = pose[converged & ~same]
         other += len(elsewhere)
         admissible = platform.in_workspace(elsewhere) & (assembly_sign(platform, elsewhere) > 0)
         twins += int(np.sum(admissible))
     return Outcome(len(legs), true, other, twins, len(legs) - true - other)
+
+
+def same_pose(platform: Platform, a: Pose, b: Pose) -> NDArray[np.bool_]:
+    """Which poses (N,) are the same but for rounding, magnified near singularities."""
+    away, angle = a.distance(b)
+    return (away <= SAME * platform.size) & (angle <= SAME)
 
 
 @torch.no_grad()
