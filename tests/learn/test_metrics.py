@@ -85,5 +85,6 @@ def test_newton_counts_other_modes_and_rows_without_an_end():
     assert below.true == 0
     assert below.other + below.unconverged == 50
     assert below.other > 0
+    assert below.twins == 0  # none of them is in the workspace
     impossible = outcome(platform, truth, truth, legs * [1, 1, 1, 1, 1, 9])
     assert impossible.unconverged == 50

@@ -76,3 +76,20 @@ def test_its_state_can_be_saved(steps):
     go(p, optimiser, grads[steps:])
     go(q, other, grads[steps:])
     assert torch.equal(p, q)
+
+
+def test_squares_stay_with_their_directions_when_these_change_places():
+    p = nn.Parameter(torch.zeros(2, 1).double())
+    optimiser = SOAP([p], lr=0.01, refresh=1)
+    p.grad = torch.tensor([[1.0], [0.0]]).double()
+    optimiser.step()
+    state = optimiser.state[p]
+    first = state["left_basis"][:, 0].abs().tolist()
+    state["left"].copy_(torch.diag(torch.tensor([1.0, 4.0])))
+    state["left_basis"].copy_(torch.eye(2))
+    state["square"].copy_(torch.tensor([[1.0], [4.0]]))
+    p.grad = torch.zeros(2, 1).double()
+    optimiser.step()
+    assert first == [1.0, 0.0]
+    assert state["left_basis"][:, 0].abs().tolist() == [0.0, 1.0]
+    assert state["square"][0] > state["square"][1]

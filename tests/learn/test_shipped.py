@@ -32,6 +32,7 @@ def test_they_reach_what_is_required(name, trans, rot, ik, worst):
     assert row.metrics.ik_mean <= ik
     assert row.metrics.trans_worst <= worst
     assert row.outcome.true == 5000
+    assert row.wrong == 0
     assert row.parameters is not None
     assert row.parameters <= 135_000
 

@@ -43,7 +43,8 @@ def weights_only(monkeypatch):
     """Runs end without an ONNX file, which takes seconds to write."""
 
     def save(model, config, record, folder):
-        save_tensors(folder / "weights.safetensors", model.state_dict(), {})
+        facts = {"record": record}
+        save_tensors(folder / "weights.safetensors", model.state_dict(), facts)
 
     monkeypatch.setattr("gough.learn.train.export_run", save)
 
@@ -137,6 +138,21 @@ def test_two_processes_learn_what_one_does_with_the_joint_batch(tmp_path, weight
     first, second = weights(alone), weights(together)
     for name in first:
         torch.testing.assert_close(first[name], second[name], rtol=1e-8, atol=1e-10)
+
+
+def test_a_run_can_start_from_the_weights_of_another(tmp_path, weights_only):
+    first = train(reference(), tiny(60), tmp_path / "first", show=False)
+    still = replace(tiny(1), optimiser=replace(tiny().optimiser, lr=0.0))
+    second = train(reference(), still, tmp_path / "second", start=first, show=False)
+    assert_same_weights(first, second)
+    assert float(metrics(second)[-1]["trans"]) == float(metrics(first)[-1]["trans"])
+    record = load_tensors(second / "weights.safetensors")[1]["record"]
+    assert record["started_from"]["steps"] == 60
+    with pytest.raises(GoughError, match="no such file"):
+        train(reference(), tiny(), tmp_path / "third", start=tmp_path)
+    other = with_model(tiny(), "resmlp", width=8, depth=2)
+    with pytest.raises(GoughError, match="of another network"):
+        train(reference(), other, tmp_path / "fourth", start=first, show=False)
 
 
 def test_a_budget_is_kept_and_the_schedule_ends(tmp_path):

@@ -74,6 +74,7 @@ def train(
     ),
     resume: bool = False,
     prepare: bool = False,
+    start: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")] = None,
     budget: Annotated[str | None, arg(metavar="TIME", help_behavior_hint="")] = None,
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     seed: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,
@@ -92,6 +93,7 @@ def train(
     Args:
         resume: go on with the run of this folder, after it was stopped or killed.
         prepare: only make the folder, for torchrun -m gough.learn.train FOLDER.
+        start: another run, whose weights are the first of this one.
         budget: time to train, such as 90s, 30m or 2h; the preset's unless given.
         steps: number of steps in place of a budget; such a run repeats bit for bit.
         seed: of the weights at the start and of the samples.
@@ -103,10 +105,10 @@ def train(
     config = preset.with_run(**{k: v for k, v in changes.items() if v is not None})
     machine = _platform(platform, workspace)
     if prepare:
-        loop.prepare(machine, config, out)
+        loop.prepare(machine, config, out, start)
         print(f"{out}: ready; torchrun --nproc-per-node N -m gough.learn.train {out}")
         return 0
-    loop.train(machine, config, out, resume=resume)
+    loop.train(machine, config, out, resume=resume, start=start)
     print(f"{out}: trained; use it with: gough solve LEGS -p {platform} --seed {out}")
     return 0
 

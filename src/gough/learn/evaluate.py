@@ -13,11 +13,12 @@ import numpy as np
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.fk.network import find_network, shipped_names
-from gough.fk.seeds import PoseSeed, Seed
+from gough.fk.seeds import PolynomialSeed, Seed
+from gough.fk.solve import solve
 from gough.learn.dataset import DatasetSpec, dataset
 from gough.learn.metrics import THRESHOLDS, Metrics, measure
 from gough.learn.models.polynomial import PolynomialGuess
-from gough.learn.newton import Outcome, outcome
+from gough.learn.newton import Outcome, outcome, same_pose
 from gough.platform import Platform
 from gough.pose import Pose
 
@@ -34,6 +35,9 @@ class Row:
         seconds: time that training or fitting took.
         seed: of that training.
         per_thousand: seconds for 1000 guesses, in one call, on this machine.
+        outcome: where plain Newton ends, with no second try.
+        wrong: rows that `gough.solve` from this guess, with all its tries, does not end at the
+            true pose.
     """
 
     name: str
@@ -43,6 +47,7 @@ class Row:
     per_thousand: float
     metrics: Metrics
     outcome: Outcome
+    wrong: int
 
 
 def default_names(platform: Platform) -> list[str]:
@@ -75,16 +80,18 @@ def evaluate(platform: Platform, names: Sequence[str], *, poses: int = 100_000,
 def _row(platform: Platform, name: str, truth: Pose, legs: Array, same_assembly: bool) -> Row:
     seed, parameters, seconds, number = _seed(platform, name, same_assembly)
     guess = seed.guess(legs)
+    solved = solve(platform, legs, seed=seed).pose
     return Row(
         name, parameters, seconds, number, per_thousand(seed, legs),
         measure(platform, guess, truth, legs), outcome(platform, guess, truth, legs),
+        int(np.sum(~same_pose(platform, solved, truth))),
     )  # fmt: skip
 
 
 def _seed(platform: Platform, name: str, same_assembly: bool) -> tuple:
     """The first guess of a name; its parameters, training time and seed."""
     if name == "home":
-        return PoseSeed(platform.home), None, None, None
+        return PolynomialSeed(platform, 0), None, None, None
     if name.startswith("polynomial-"):
         degree = name.removeprefix("polynomial-")
         if not degree.isdigit():
@@ -93,7 +100,13 @@ def _seed(platform: Platform, name: str, same_assembly: bool) -> tuple:
         return fitted, fitted.parameters, fitted.seconds, 0
     seed = find_network(platform, name)
     record = seed.facts["record"]
-    return seed, seed.facts["parameters"], record["seconds"], record["seed"]
+    return seed, seed.facts["parameters"], training_time(record), record["seed"]
+
+
+def training_time(record: dict) -> float:
+    """Seconds of a run and of those before it, whose weights it started from."""
+    before = record.get("started_from")
+    return record["seconds"] + (training_time(before) if before else 0.0)
 
 
 def per_thousand(seed: Seed, legs: Array, repeats: int = 7) -> float:
@@ -143,7 +156,7 @@ def table(platform: Platform, rows: Sequence[Row]):
     columns = (
         "first guess", "numbers", "trained s", "seed", f"E-trans {unit}", "median", "worst",
         f"<{THRESHOLDS[1]:g} {unit} %", "E-rot deg", "worst deg", "E-rot paper's", "E-ik",
-        "Newton: true %", "other", "not conv.", "1000 guesses ms",
+        "Newton: true %", "other", "twins", "not conv.", "solve: wrong", "1000 guesses ms",
     )  # fmt: skip
     for i, column in enumerate(columns):
         out.add_column(column, justify="left" if i == 0 else "right", no_wrap=i == 0)
@@ -154,6 +167,7 @@ def table(platform: Platform, rows: Sequence[Row]):
 
 def _cells(row: Row) -> list[str]:
     m, o = row.metrics, row.outcome
+    ends = [f"{100 * o.share:.4f}", str(o.other), str(o.twins), str(o.unconverged), str(row.wrong)]
     name = Path(row.name).name if "/" in row.name else row.name
     optional = [
         "-" if v is None else f"{v:{spec}}"
@@ -163,8 +177,7 @@ def _cells(row: Row) -> list[str]:
     turns = [m.rot_mean, m.rot_worst, m.rot_frobenius, m.ik_mean]
     return [
         name, *optional, *(f"{v:.4g}" for v in errors), f"{100 * m.trans_within[1]:.2f}",
-        *(f"{v:.4g}" for v in turns), f"{100 * o.share:.4f}", str(o.other), str(o.unconverged),
-        f"{1e3 * row.per_thousand:.2f}",
+        *(f"{v:.4g}" for v in turns), *ends, f"{1e3 * row.per_thousand:.2f}",
     ]  # fmt: skip
 
 

@@ -13,24 +13,33 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from gough.checks import Array
-from gough.kinematics import equivalent_struts
+from gough.kinematics import assembly_sign, equivalent_struts
 from gough.learn.geometry import quaternion_to_matrix
 from gough.platform import Platform
 from gough.pose import Pose
 
-STEPS = 30
+STEPS = 60
 CHUNK = 50_000
-CONVERGED = 1e-10  # largest leg error of a converged row, of the platform's size
-SAME = 1e-6  # poses closer than this, of the platform's size or in rad, are the same
+CONVERGED = 1e-12  # largest leg error of a converged row, of the platform's size
+SAME = 1e-5  # poses closer than this, of the platform's size or in rad, are the same
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the rows ended: counts that add up to `count`."""
+    """Where the rows ended: `true`, `other` and `unconverged` add up to `count`.
+
+    Attributes:
+        true: at the true pose.
+        other: at another pose with the same readings.
+        twins: those of `other` whose pose is in the workspace too, with det J of home's sign:
+            the readings alone cannot tell which of the two was meant.
+        unconverged: nowhere within 60 steps.
+    """
 
     count: int
     true: int
     other: int
+    twins: int
     unconverged: int
 
     @property
@@ -41,20 +50,28 @@ class Outcome:
 
 def outcome(platform: Platform, guess: Pose, truth: Pose, legs: Array) -> Outcome:
     """Refine guesses (N,) for readings (N, 6) and compare with the true poses (N,)."""
-    true = other = 0
+    true = other = twins = 0
     for start in range(0, len(legs), CHUNK):
         part = slice(start, start + CHUNK)
         pose, converged = refine(platform, guess[part], legs[part])
-        away, angle = pose.distance(truth[part])
-        same = (away <= SAME * platform.size) & (angle <= SAME)
+        same = same_pose(platform, pose, truth[part])
         true += int(np.sum(converged & same))
-        other += int(np.sum(converged & ~same))
-    return Outcome(len(legs), true, other, len(legs) - true - other)
+        elsewhere = pose[converged & ~same]
+        other += len(elsewhere)
+        admissible = platform.in_workspace(elsewhere) & (assembly_sign(platform, elsewhere) > 0)
+        twins += int(np.sum(admissible))
+    return Outcome(len(legs), true, other, twins, len(legs) - true - other)
+
+
+def same_pose(platform: Platform, a: Pose, b: Pose) -> NDArray[np.bool_]:
+    """Which poses (N,) are the same but for rounding, magnified near singularities."""
+    away, angle = a.distance(b)
+    return (away <= SAME * platform.size) & (angle <= SAME)
 
 
 @torch.no_grad()
 def refine(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, NDArray[np.bool_]]:
-    """Newton steps from guesses (N,): poses, and which rows (N,) converged within 30 steps.
+    """Newton steps from guesses (N,): poses, and which rows (N,) converged within 60 steps.
 
     A step moves by (v, w): t + v and exp(w) R. Its rows are n_i . v + (R p_i x n_i) . w.
     """

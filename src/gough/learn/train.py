@@ -25,11 +25,11 @@ import torch
 from torch import Tensor
 
 from gough.errors import GoughError
-from gough.learn.checkpoint import load_state, save_state, write_whole
+from gough.learn.checkpoint import load_state, load_tensors, save_state, write_whole
 from gough.learn.config import TrainConfig
 from gough.learn.distributed import Team
 from gough.learn.environment import environment
-from gough.learn.export import export_run
+from gough.learn.export import WEIGHTS, export_run
 from gough.learn.logs import Bar, MetricsFile, TensorBoard
 from gough.learn.loss import default_beta, training_loss
 from gough.learn.models import PoseNetwork, Scaling, build
@@ -38,17 +38,18 @@ from gough.learn.sampling import Batch, Stream
 from gough.learn.schedule import Clock, learning_rate
 from gough.platform import Platform
 
-CHECKPOINT = "checkpoint.safetensors"
+CHECKPOINT, START = "checkpoint.safetensors", "start.safetensors"
 TRAIN, FIXED, TEST, ORDER = 0, 1, 2, 3  # what a stream's samples are for
 
 
 def train(platform: Platform, config: TrainConfig, folder: str | Path, *, resume: bool = False,
-          show: bool = True) -> Path:  # fmt: skip
+          start: str | Path | None = None, show: bool = True) -> Path:  # fmt: skip
     """Train a first guess; its folder.
 
     Args:
         folder: of the run; made here, and must not hold another run unless `resume`.
         resume: go on from the folder's checkpoint, with the folder's own configuration.
+        start: another run's folder, whose weights are the first of this one.
         show: a progress bar on stderr.
 
     Raises:
@@ -56,24 +57,30 @@ def train(platform: Platform, config: TrainConfig, folder: str | Path, *, resume
     """
     folder = Path(folder)
     if not resume:
-        prepare(platform, config, folder)
+        prepare(platform, config, folder, start)
     elif not (folder / "config.json").exists():
         raise GoughError(f"{folder}: holds no run to resume; train without --resume to start one")
     return run(folder, show=show)
 
 
-def prepare(platform: Platform, config: TrainConfig, folder: Path) -> None:
+def prepare(platform: Platform, config: TrainConfig, folder: Path,
+            start: str | Path | None = None) -> None:  # fmt: skip
     """Make a run's folder, ready to `run`.
 
     Raises:
-        GoughError: it holds a run already.
+        GoughError: it holds a run already, or `start` holds no weights.
     """
+    weights = None if start is None else Path(start) / WEIGHTS
+    if weights is not None:
+        load_tensors(weights)
     if (folder / "config.json").exists():
         raise GoughError(f"{folder}: holds a run already; resume it, or name another folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise GoughError(f"{folder}: cannot be made: {error.strerror}") from None
+    if weights is not None:
+        write_whole(folder / START, weights.read_bytes())
     platform.save(folder / "platform.toml")
     write_whole(folder / "config.json", config.to_json().encode())
 
@@ -124,6 +131,8 @@ class Trainer:
         """Train to the end from the last checkpoint, if there is one; export."""
         if (self.folder / CHECKPOINT).exists():
             self._load()
+        elif (self.folder / START).exists():
+            self._start()
         first = self.team.rank == 0
         bar = Bar(self.platform.unit, show)
         metrics = MetricsFile(self.folder / "metrics.csv", self.step) if first else None
@@ -227,9 +236,16 @@ class Trainer:
             "samples": self.step * self.config.data.batch,
             "seed": self.config.run.seed,
             "processes": self.team.size,
+            "started_from": self._before(),
             "environment": environment(self.device),
             "test": self.measure(float("nan"), 1.0) | {"loss": None},
         }
+
+    def _before(self) -> dict | None:
+        """The record of the run whose weights this one started from."""
+        if not (self.folder / START).exists():
+            return None
+        return load_tensors(self.folder / START)[1]["record"]
 
     def save(self) -> None:
         """Write the checkpoint."""
@@ -239,6 +255,14 @@ class Trainer:
     def _load(self) -> None:
         facts = load_state(self.folder / CHECKPOINT, self.model, self.average, self.optimiser)
         self.step, self.clock.elapsed = facts["step"], facts["elapsed"]
+
+    def _start(self) -> None:
+        try:
+            self.model.load_state_dict(load_tensors(self.folder / START)[0])
+        except RuntimeError as error:
+            raise GoughError(f"{self.folder / START}: of another network: {error}") from None
+        if self.average:
+            self.average = self._weights()
 
     def use_average(self) -> None:
         """Make the averaged weights, if there are any, the model's own."""

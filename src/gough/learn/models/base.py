@@ -20,7 +20,7 @@ from gough.pose import Pose, wxyz_product
 Rotation = Literal["quaternion", "nine", "euler"]
 OUTPUTS = {"quaternion": 7, "nine": 12, "euler": 6}
 SCALING_POSES = 20_000
-WIDER = 0.01  # of the range of readings, to either side
+WIDER = 0.03  # of the range of readings, to either side
 
 
 @dataclass(frozen=True, eq=False)
