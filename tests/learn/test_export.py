@@ -88,6 +88,7 @@ def test_it_is_a_plain_onnx_file(run):
     onnx.checker.check_model(model)
     keys = {p.key: p.value for p in model.metadata_props}
     assert set(keys) == {"gough", "gough.sha256"}
+    assert b".py" not in (run / "network.onnx").read_bytes()  # no paths of whoever trained it
     assert json.loads(keys["gough"])["kind"] == "resmlp"
 
 

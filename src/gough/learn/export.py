@@ -66,7 +66,7 @@ def to_onnx(model: PoseNetwork, facts: dict) -> bytes:
         )  # fmt: skip
     assert program is not None
     proto = program.model_proto
-    del proto.metadata_props[:]
+    _strip(proto)
     entry = proto.metadata_props.add()
     entry.key, entry.value = "gough", json.dumps(facts)
     onnx.checker.check_model(proto)
@@ -93,6 +93,15 @@ def load_network(path: str | Path, platform: Platform) -> tuple[PoseNetwork, dic
     model = build(config.model.kind, platform, scaling, **config.model.options)
     model.load_state_dict(tensors)
     return model.eval(), facts
+
+
+def _strip(proto: onnx.ModelProto) -> None:
+    """Drop the exporter's notes, among them paths of source files."""
+    graph = proto.graph
+    parts = [proto, graph, *graph.node, *graph.value_info, *graph.input, *graph.output]
+    for part in [*parts, *graph.initializer]:
+        del part.metadata_props[:]
+        part.doc_string = ""
 
 
 class _Raw(nn.Module):
