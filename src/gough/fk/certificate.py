@@ -84,12 +84,13 @@ def certify(platform: Platform, legs: ArrayLike, pose: Pose) -> Certificate:
     pivot = platform.pivot_point
     shape = np.broadcast_shapes(lengths.shape[:-1], pose.batch)
     # with a pivot c, joints are R (p - c) + c + t: p - c and b - c have the pose as it is
-    base = np.broadcast_to(base - pivot, (*shape, 6, 3)).reshape(-1, 6, 3)
+    if platform.rotary is None:  # one base for all rows
+        base = (platform.base - pivot)[None]
+    else:
+        base = np.broadcast_to(base - pivot, (*shape, 6, 3)).reshape(-1, 6, 3)
     lengths = np.broadcast_to(lengths, (*shape, 6)).reshape(-1, 6)
     position = np.broadcast_to(pose.position, (*shape, 3)).reshape(-1, 3)
     wxyz = np.broadcast_to(pose.wxyz, (*shape, 4)).reshape(-1, 4)
-    if platform.rotary is None:
-        base = base[:1]
     certified, radius, error = _certify(base, platform.moving - pivot, lengths, position, wxyz)
     return Certificate(certified.reshape(shape), radius.reshape(shape), error.reshape(shape))
 

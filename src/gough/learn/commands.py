@@ -85,6 +85,7 @@ def train(
     """Train a first guess for a platform, ten minutes unless told otherwise.
 
     gough train -p my.toml -o runs/mine
+
     gough solve legs.csv -p my.toml --seed runs/mine
 
     Options of the network and its training follow a preset's name: default, disgnet, wide or
@@ -128,6 +129,7 @@ def evaluate(
     """First guesses side by side: errors, where Newton's method ends, time.
 
     gough evaluate
+
     gough evaluate runs/mine polynomial-5 -p my.toml
 
     Args:
