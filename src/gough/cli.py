@@ -77,7 +77,7 @@ def _dispatch(arguments: list[str]) -> int:
     module, function, _ = COMMANDS[command]
     run = getattr(import_module(module), function)
     # flags are --flag alone, without a --no-flag beside it
-    config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes)
+    config = (tyro.conf.FlagCreatePairsOff,)
     return tyro.cli(run, prog=f"gough {command}", args=rest, config=config)
 
 
