@@ -26,7 +26,8 @@ def test_solving_the_example_without_a_file_prints_poses_and_a_summary(gough):
     assert [line.split()[-1] for line in lines[2:5]] == ["converged"] * 3
     assert lines[2].split()[:3] == ["0.0000065", "0.0005751", "-0.0000168"]
     assert re.match(r"1,000 rows in .* s \(.* rows/s\)", lines[5])
-    assert lines[8].startswith("converged  1,000  100.0 %")
+    # a line more where this was the run that compiled the solver
+    assert sum(line.startswith("converged  1,000  100.0 %") for line in lines[8:10]) == 1
     assert "The pose has these leg readings" in out
     assert max(map(len, lines)) <= 80
 

@@ -19,8 +19,10 @@ SLOW = ("--block-rows", 200)  # many blocks: time to interrupt
 
 def start(*arguments: object, **options) -> subprocess.Popen:
     def restore() -> None:
-        # a shell may have started the tests with SIGINT ignored, which children would inherit
+        # what started the tests may ignore signals (a shell SIGINT, nohup SIGHUP), and children
+        # would inherit that
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
     return subprocess.Popen(
         command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

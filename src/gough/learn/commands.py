@@ -47,8 +47,9 @@ def dataset(
 
     gough dataset -p reference -o data.parquet
 
-    The first 80 % of the rows are for training. The same seed gives the same rows whatever the
-    number of processes.
+    The first 80 % of the rows are for training.
+
+    The same seed gives the same rows whatever the number of processes.
 
     Args:
         count: rows.
@@ -88,8 +89,9 @@ def train(
 
     gough solve legs.csv -p my.toml --seed runs/mine
 
-    Options of the network and its training follow a preset's name: default, disgnet, wide or
-    paper, such as: gough train -p my.toml default --optimiser.lr 1e-3
+    Options of the network and its training follow a preset's name:
+
+    gough train -p my.toml default --optimiser.lr 1e-3
 
     Args:
         resume: go on with the run of this folder, after it was stopped or killed.

@@ -25,7 +25,7 @@ def run(
         arg(aliases=["-p"], metavar="PLATFORM", help="a machine of the catalog, or a .toml file."),
     ],
     out: Annotated[str | None, arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")] = None,
-    plot: Annotated[str | None, arg(metavar="PNG|SVG|PDF", help_behavior_hint="")] = None,
+    plot: Annotated[str | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     threads: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
 ) -> int:
     """Every pose that leg readings allow, each with its proof.
@@ -34,13 +34,13 @@ def run(
 
     gough modes 652.1 660.3 655.0 648.8 671.2 639.9 -p reference --plot modes.png
 
-    Exit code 0: every list of poses is complete; 1: some may not be, or a row is invalid.
+    Exit code 0: every list of poses is complete; 1: one may not be, or is invalid.
 
     Args:
         legs: six readings, or a .csv or .parquet file with columns leg_1 to leg_6; without
             them, those of the home pose.
         out: file to write, .csv or .parquet, one row for each pose.
-        plot: draw all poses of the first set of readings.
+        plot: .png, .svg or .pdf to draw all poses of the first set of readings in.
         threads: at most so many.
     """
     from gough.modes.assembly import assembly_modes
