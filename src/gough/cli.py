@@ -13,6 +13,9 @@ from gough.commands import COMMANDS, stopping
 from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
+EXTRAS = {"matplotlib": "plot"} | dict.fromkeys(
+    ("torch", "safetensors", "onnx", "onnxscript", "tensorboard"), "learn"
+)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -48,6 +51,14 @@ def _guarded(arguments: list[str]) -> int:
         _drop_output()
         where = f"{error.filename}: " if error.filename else ""
         return _complain(f"{name}: error: {where}{error.strerror or error}")
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        return _complain(
+            f"{name}: error: needs {error.name}, which is not installed; install it with: "
+            f"pip install 'gough[{extra}]', or in a clone: pip install -e '.[{extra}]'"
+        )
     except Exception:
         number = stopping.asked()
         if number is None:

@@ -202,3 +202,23 @@ def test_memory_does_not_grow_with_the_file(many, tmp_path, ending):
         assert done.returncode in (0, 1)
         peaks.append(int(peak.read_text()) / 1024)  # [MB]
     assert peaks[1] < 300, peaks
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "extra"),
+    [
+        ("torch", ["train", "-p", "reference"], "learn"),
+        ("matplotlib", ["modes", "-p", "reference", "--plot", "modes.png"], "plot"),
+    ],
+)
+def test_what_an_extra_brings_is_asked_for(module, arguments, extra, tmp_path):
+    program = (
+        f"import sys; sys.modules[{module!r}] = None; from gough.cli import main; main({arguments})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert f"needs {module}, which is not installed" in done.stderr
+    assert f"pip install 'gough[{extra}]'" in done.stderr
