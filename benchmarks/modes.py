@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import gough
+from gough.fk import bulk
 from gough.fk.certificate import certify_batch
-from gough.modes.assembly import usable_cores
 from gough.modes.starts import find_start, start_of
 
 MACHINES = (
@@ -89,7 +89,7 @@ def special() -> None:
 
 
 def times(count: int) -> None:
-    cores = usable_cores()
+    cores = bulk.cores()
     heading(f"time per set of readings, {count} sets from the workspace")
     print(f"{'machine':16} solutions  one call  in a batch  {cores} threads   real poses")
     for name in MACHINES:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array, as_batch
+from gough.fk.bulk import cores
 from gough.fk.certificate import certify
 from gough.kinematics import equivalent_struts
 from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, is_far
@@ -105,7 +105,7 @@ class _Outcome:
 def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int | None) -> None:
     """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
     chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
-    workers = min(len(chunks), threads or usable_cores())
+    workers = min(len(chunks), threads or cores())
 
     def run(chunk: NDArray[np.int64]) -> NDArray[np.int64]:
         return _solve(work, chunk, outcome)
@@ -117,13 +117,6 @@ def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int |
             left = list(pool.map(run, chunks))
     for row in np.concatenate([*left, np.zeros(0, np.int64)]).astype(int):
         _solve_again(work, row, outcome)
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float) -> _Tracked:
