@@ -8,6 +8,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from gough.learn.metrics import THRESHOLDS
+
 COLUMNS = (
     "step",
     "seconds",
@@ -18,6 +20,8 @@ COLUMNS = (
     "trans",
     "rot_deg",
     "ik",
+    *(f"trans_below_{t:g}" for t in THRESHOLDS),
+    *(f"rot_below_{t:g}" for t in THRESHOLDS),
 )
 
 
@@ -44,7 +48,7 @@ class MetricsFile:
 def _step(row: dict) -> float:
     """Its step; beyond all others for a line that was cut off."""
     try:
-        return float(row["step"]) if row["ik"] is not None else float("inf")
+        return float(row["step"]) if row[COLUMNS[-1]] is not None else float("inf")
     except (KeyError, TypeError, ValueError):
         return float("inf")
 

@@ -29,6 +29,10 @@ class Batch:
     def __getitem__(self, index) -> Batch:
         return Batch(self.legs[index], self.shift[index], self.turn[index])
 
+    def to(self, device: torch.device) -> Batch:
+        """The same on another device."""
+        return Batch(self.legs.to(device), self.shift.to(device), self.turn.to(device))
+
     @staticmethod
     def join(parts: list[Batch]) -> Batch:
         """One batch of several."""

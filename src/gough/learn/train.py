@@ -27,19 +27,23 @@ from torch import Tensor
 from gough.errors import GoughError
 from gough.learn.checkpoint import load_state, load_tensors, save_state, write_whole
 from gough.learn.config import TrainConfig
+from gough.learn.dataset import DatasetSpec, dataset
 from gough.learn.distributed import Team
 from gough.learn.environment import environment
 from gough.learn.export import WEIGHTS, export_run
+from gough.learn.geometry import quaternion_to_matrix
 from gough.learn.logs import Bar, MetricsFile, TensorBoard
 from gough.learn.loss import default_beta, training_loss
+from gough.learn.metrics import THRESHOLDS
 from gough.learn.models import PoseNetwork, Scaling, build
 from gough.learn.optim import SOAP
 from gough.learn.sampling import Batch, Stream
 from gough.learn.schedule import Clock, learning_rate
 from gough.platform import Platform
+from gough.pose import wxyz_product
 
 CHECKPOINT, START = "checkpoint.safetensors", "start.safetensors"
-TRAIN, FIXED, TEST, ORDER = 0, 1, 2, 3  # what a stream's samples are for
+TRAIN, TEST, ORDER = 0, 2, 3  # what a stream's samples are for
 
 
 def train(platform: Platform, config: TrainConfig, folder: str | Path, *, resume: bool = False,
@@ -121,7 +125,7 @@ class Trainer:
         self.test = self.stream.batch(config.data.test, seed, TEST)
         self.fixed = None
         if config.data.samples is not None:
-            self.fixed = self.stream.batch(config.data.samples, seed, FIXED)
+            self.fixed = training_rows(platform, config).to(self.device)
         self.clock = Clock(config)
         self.step = 0
 
@@ -211,6 +215,8 @@ class Trainer:
         cosine = ((turn.mT @ self.test.turn).diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
         sine = torch.linalg.vector_norm((turn - self.test.turn).flatten(1), dim=-1) / 8**0.5
         angle = torch.where(cosine > 0, 2 * sine.clamp(max=1).asin(), cosine.clamp(-1, 1).acos())
+        away = torch.linalg.vector_norm(shift - self.test.shift, dim=-1)
+        turned = angle.rad2deg()
         ik = self.stream.platform.legs(shift, turn) - self.test.legs
         if kept is not None:
             self._set_weights(kept)
@@ -222,9 +228,11 @@ class Trainer:
             "samples_per_second": samples / max(self.clock.elapsed, 1e-9),
             "lr": learning_rate(self.config.optimiser, self.step, progress),
             "loss": loss,
-            "trans": float(torch.linalg.vector_norm(shift - self.test.shift, dim=-1).mean()),
-            "rot_deg": float(angle.rad2deg().mean()),
+            "trans": float(away.mean()),
+            "rot_deg": float(turned.mean()),
             "ik": float(torch.linalg.vector_norm(ik, dim=-1).mean()),
+            **{f"trans_below_{t:g}": float((away < t).double().mean()) for t in THRESHOLDS},
+            **{f"rot_below_{t:g}": float((turned < t).double().mean()) for t in THRESHOLDS},
         }
 
     def record(self) -> dict:
@@ -279,6 +287,15 @@ class Trainer:
 
     def _progress(self) -> float:
         return self.team.agree(self.clock.progress(self.step), self.device)
+
+
+def training_rows(platform: Platform, config: TrainConfig) -> Batch:
+    """The first `data.samples` rows of the data set that `gough dataset` writes for this seed."""
+    spec = DatasetSpec(config.data.samples or 0, config.run.seed, config.data.same_assembly)
+    pose, legs = dataset(platform, spec)
+    turn = wxyz_product(platform.home.inverse().wxyz, pose.wxyz)
+    shift = pose.position - platform.home.position
+    return Batch(torch.tensor(legs), torch.tensor(shift), quaternion_to_matrix(torch.tensor(turn)))
 
 
 def _optimiser(config: TrainConfig, model: PoseNetwork) -> torch.optim.Optimizer:
