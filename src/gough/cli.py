@@ -13,7 +13,7 @@ from gough.commands import COMMANDS, stopping
 from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
-EXTRAS = {"matplotlib": "plot"} | dict.fromkeys(
+EXTRAS = {"matplotlib": "plot", "viser": "view"} | dict.fromkeys(
     ("torch", "safetensors", "onnx", "onnxscript", "tensorboard"), "learn"
 )
 
