@@ -17,7 +17,7 @@ from torch import Tensor
 
 from gough.learn.geometry import quaternion_to_matrix
 
-# Powers of -q^2 in sin q / q, a, b, a' / q and b' / q: for q < 1 ten terms reach rounding.
+# Factors of (-q^2)^k in sin q / q, a, b, a' / q, b' / q: for q < 1 ten terms reach rounding.
 _SERIES = [
     [
         1 / math.factorial(2 * k + 1),
@@ -58,7 +58,7 @@ def shortest(xi: Tensor) -> Tensor:
 
 
 def exp_jacobian(xi: Tensor) -> Tensor:
-    """d twist / d xi, (..., 6, 6): twist = (velocity of the position, angular velocity), in base axes.
+    """d twist / d xi, (..., 6, 6), the twist as in `gough.jacobian`.
 
     [[V, D], [0, V]] with D = d(V rho) / d w. This is the left Jacobian of SE(3) but for its first
     rows: those of the left Jacobian give the velocity of the point at the base's origin.
@@ -109,7 +109,10 @@ def hat(v: Tensor) -> Tensor:
 
 
 def _with_position(position: Tensor, w: Tensor) -> Tensor:
-    """(V^-1 t, w). V^-1 = I - [w]/2 + c [w]^2 and c = (1 - (q/2) cot(q/2)) / q^2 = -a' / (2 a q)."""
+    """xi = (V^-1 t, w).
+
+    V^-1 = I - [w] / 2 + c [w]^2, c = (1 - (q/2) cot(q/2)) / q^2 = -a' / (2 a q).
+    """
     _, a, _, slope_a, _ = _coefficients(w)
     once = torch.linalg.cross(w, position)
     rho = position - once / 2 - slope_a / (2 * a) * torch.linalg.cross(w, once)
@@ -121,8 +124,10 @@ def _coefficients(w: Tensor) -> tuple[Tensor, ...]:
     square = (w * w).sum(-1)
     small = square < 1
     table = torch.tensor(_SERIES, dtype=w.dtype, device=w.device)
-    powers = torch.vander(-torch.where(small, square, 0).reshape(-1), len(table), increasing=True)
-    series = (powers @ table).reshape(*square.shape, 5)
+    x = torch.where(small, square, 0)[..., None]
+    series = torch.zeros_like(x)
+    for row in reversed(table):
+        series = row - x * series
     square = torch.where(small, 1, square)
     q = square.sqrt()
     sinc = q.sin() / q
