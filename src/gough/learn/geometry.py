@@ -17,6 +17,7 @@ class TorchPlatform(nn.Module):
 
     base: Tensor
     arms: Tensor
+    pivot: Tensor
     origin: Tensor
     home_rotation: Tensor
     home_lengths: Tensor
@@ -33,6 +34,7 @@ class TorchPlatform(nn.Module):
         facts = {
             "base": platform.base,
             "arms": platform.moving - platform.pivot_point,
+            "pivot": platform.pivot_point,
             "origin": platform.home.position + platform.pivot_point,
             "home_rotation": platform.home.rotation,
             "home_lengths": platform.home_lengths,
@@ -51,6 +53,33 @@ class TorchPlatform(nn.Module):
         """Base joint to platform joint, and pivot to platform joint, each (..., 6, 3) [unit]."""
         arms = self.arms @ self.rotation(turn).mT  # (..., 6, 3)
         return arms + (self.origin + shift)[..., None, :] - self.base, arms
+
+    def equivalent_struts(self, legs: Tensor) -> tuple[Tensor, Tensor]:
+        """Where struts start (..., 6, 3) and their lengths (..., 6): see `gough.kinematics`."""
+        if self.platform.rotary is not None:
+            angle = legs[..., None]
+            tips = self.base + self.arm * (angle.cos() * self.axis_x + angle.sin() * self.axis_y)
+            return tips, self.rod.expand(legs.shape)
+        if self.platform.legs == "length_change":
+            legs = legs + self.home_lengths
+        return self.base.expand(*legs.shape, 3), legs
+
+    def strut_errors(self, position: Tensor, rotation: Tensor, starts: Tensor, lengths: Tensor
+                     ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """By how much struts at poses in base coordinates are too long, and d errors / d twist.
+
+        Args:
+            position, rotation: (..., 3), (..., 3, 3), of the pose itself, not relative to home.
+            starts, lengths: what the readings ask for, from `equivalent_struts`.
+
+        Returns:
+            (..., 6) [unit] and (..., 6, 6), the twist as in `gough.jacobian`.
+        """
+        arms = self.arms @ rotation.mT
+        struts = arms + (position + self.pivot)[..., None, :] - starts
+        now = torch.linalg.vector_norm(struts, dim=-1)
+        n = struts / now[..., None]
+        return now - lengths, torch.cat([n, torch.linalg.cross(arms, n)], dim=-1)
 
     def legs(self, shift: Tensor, turn: Tensor) -> Tensor:
         """Readings (..., 6); NaN where a motor cannot reach."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from gough.checks import Array
 from gough.kinematics import assembly_sign, equivalent_struts
 from gough.learn.geometry import quaternion_to_matrix
+from gough.learn.se3 import rotation_exp
 from gough.platform import Platform
 from gough.pose import Pose
 
@@ -97,14 +97,7 @@ def refine(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, NDArray[
         J = torch.cat([n, torch.linalg.cross(arms, n)], dim=-1)  # (N, 6, 6)
         step = torch.linalg.solve_ex(J, -error)[0]
         t[left] += step[:, :3]
-        R[left] = _exp(step[:, 3:]) @ R[left]
+        R[left] = rotation_exp(step[:, 3:]) @ R[left]
     finite = t.isfinite().all(-1) & R.isfinite().all(-1).all(-1)
     t[~finite], R[~finite] = 0, torch.eye(3, dtype=R.dtype)
     return Pose.from_rotation(t.numpy(), R.numpy()), (converged & finite).numpy()
-
-
-def _exp(w: Tensor) -> Tensor:
-    """Rotation matrices (N, 3, 3) of rotation vectors (N, 3) [rad]."""
-    half = torch.linalg.vector_norm(w, dim=-1, keepdim=True) / 2
-    wxyz = torch.cat([half.cos(), w / 2 * torch.sinc(half / torch.pi)], dim=-1)
-    return quaternion_to_matrix(wxyz)
