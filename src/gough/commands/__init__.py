@@ -18,4 +18,5 @@ COMMANDS = {
     "dataset": ("gough.learn.commands", "dataset", "poses and readings to learn from"),
     "train": ("gough.learn.commands", "train", "a network that guesses poses of your platform"),
     "evaluate": ("gough.learn.commands", "evaluate", "first guesses side by side"),
+    "paper": ("gough.paper.command", "run", "the DisGNet paper's experiments, run again"),
 }  # fmt: skip

@@ -8,7 +8,7 @@ from gough.learn.checkpoint import write_whole
 from gough.paper import published
 from gough.paper.claims import claims
 from gough.paper.layout import NOTHING, milliseconds, number, page, percent, table
-from gough.paper.plan import BATCH, SETS, machine_of
+from gough.paper.plan import BATCH, machine_of
 from gough.paper.study import Study
 
 TITLE = "The DisGNet paper's experiments, run again"
@@ -28,22 +28,23 @@ def introduction(study: Study) -> str:
     plan, unit = study.plan, _unit(study)
     return f"""# {TITLE}
 
-Platform `{study.platform.name}`, lengths in {unit}. The numbers in columns headed "paper" are those
+Platform `{study.platform.name}`, lengths in {unit}. Numbers in columns headed "paper" are those
 printed in Zhu et al., *DisGNet: A Distance Graph Neural Network for Forward Kinematics Learning of
-Gough-Stewart Platform*: 1200 epochs of training and times of one RTX 3090, on a platform whose
-joints it does not print; so absolute errors need not agree, and what can be compared is what the
-paper claims about methods. Everything else on this page was computed by `gough paper`, which can be
-run again: `gough paper --stage NAME -o FOLDER` repeats one table from the networks in the folder, with
-the same accuracy figures to the last digit; times differ.
+Gough-Stewart Platform*: 1200 epochs of training, and times of one RTX 3090. It does not print the
+joints of its platform, so absolute errors need not agree; what can be compared is what it claims
+about methods. Everything else on this page was computed by `gough paper`, and can be computed
+again: `gough paper --stage NAME -o FOLDER` repeats one table from the networks in the folder, with
+the same accuracy figures to the last digit. Times differ.
 
-**Data.** Training rows are the first {plan.rows:,} of `gough dataset --seed {plan.seed}` (full), and the
-first 90 and 80 % of these. Errors are means over {plan.test:,} held-out poses that no training saw, from a
-seed of their own. Workspace: {_box(study, "full")}.
+**Data.** The full training set is the first {plan.rows:,} rows of `gough dataset --seed
+{plan.seed}`, the others the first 90 and 80 % of these. Errors are means over {plan.test:,}
+held-out poses that no training saw, from a seed of their own. Workspace: {_box(study, "full")}.
 
-**Training.** Every network got the same budget, {plan.budget:g} s of processor time on one thread, by the
-same recipe (SOAP, batches of {BATCH}, a rate that falls to zero; plain-mlp with its mean squared error, all
-others with the paper's loss). The budget was turned into a number of steps by timing each network's step on
-an otherwise idle machine, so that a training can be repeated bit for bit."""
+**Training.** Every network got the same budget, {plan.budget:g} s of processor time on one thread,
+by the same recipe: SOAP, batches of {BATCH}, a rate that falls to zero; plain-mlp with its mean
+squared error, all others with the paper's loss. The budget was turned into a number of steps by
+timing each network's step on an otherwise idle machine, so that a training can be repeated bit for
+bit on a machine of the same kind."""
 
 
 def claims_part(study: Study) -> str:
@@ -73,7 +74,8 @@ def networks(study: Study) -> str:
             row["name"], f"{row['parameters'] or 0:,}", theirs[0],
             number(row["trans_mean"]), theirs[1], number(row["rot_mean"]), theirs[2],
             number(row["ik_mean"]), theirs[3], number(row["trans_worst"]),
-            percent(row["true"] / row["count"], 3), milliseconds(row["thousand_seconds"]), theirs[4],
+            percent(row["true"] / row["count"], 3), milliseconds(row["thousand_seconds"]),
+            theirs[4],
         ))  # fmt: skip
     steps = [(name, f"{n:,}", number(_epochs(study, n)), number(_trained(result, name), 3))
              for name, n in study.plan.steps.items()]  # fmt: skip
@@ -219,8 +221,9 @@ def provenance(study: Study) -> str:
                   "errors"):  # fmt: skip
         made = study.result(stage)["made"]
         commit = (made["commit"] or "unknown")[:12]
-        rows.append((f"`{made['command']}`", f"`{commit}`", study.plan.seed,
-                     f"{made['processor']}, {made['cores']} cores", made["torch"], made["numpy"]))  # fmt: skip
+        machine = f"{made['processor']}, {made['cores']} cores"
+        rows.append((f"`{made['command']}`", f"`{commit}`", study.plan.seed, machine,
+                     made["torch"], made["numpy"]))  # fmt: skip
     head = ("command", "commit", "seed", "machine", "torch", "numpy")
     return "## How each was made\n\n" + table(head, rows)
 
@@ -273,4 +276,3 @@ def _box(study: Study, name: str) -> str:
 PARTS: tuple[Callable[[Study], str], ...] = (
     introduction, claims_part, networks, sets, methods, iterations, wide, figures, provenance,
 )  # fmt: skip
-assert set(SETS) == {"full", "90", "80", "wide"}
