@@ -89,6 +89,10 @@ def _dispatch(arguments: list[str]) -> int:
     run = getattr(import_module(module), function)
     # flags are --flag alone, without a --no-flag beside it
     config = (tyro.conf.FlagCreatePairsOff,)
+    if isinstance(run, dict):  # a family of commands, by name
+        return tyro.extras.subcommand_cli_from_dict(
+            run, prog=f"gough {command}", args=rest, config=config
+        )
     return tyro.cli(run, prog=f"gough {command}", args=rest, config=config)
 
 

@@ -1,8 +1,8 @@
 """The commands of `gough`, one module each: `run` parses nothing, calls, prints, returns a code.
 
 To add a command, write a function whose parameters are the options (the docstring's Args become
-the help texts) and which returns the exit code, and put a line into COMMANDS. A command stands
-in `gough/commands/NAME.py`, or in the room whose work it starts.
+the help texts) and which returns the exit code, and put a line into COMMANDS; a dict of such
+functions makes a family, as in `gough plot pose`. A command stands in `gough/commands/NAME.py`, or in the room whose work it starts.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from __future__ import annotations
 COMMANDS = {
     "solve": ("gough.commands.solve", "run", "poses from a file of leg readings"),
     "inverse": ("gough.commands.inverse", "run", "leg readings from a file of poses"),
-    "modes": ("gough.modes.command", "run", "every pose that leg readings allow, each proven"),
+    "modes": ("gough.commands.modes", "run", "every pose that leg readings allow, each proven"),
+    "plot": ("gough.commands.plot", "FIGURES", "figures: pose, modes, workspace, trajectory, errors"),
     "platforms": (
         "gough.commands.platforms", "run", "the machines that come with gough, as TOML to edit",
     ),

@@ -1,0 +1,193 @@
+"""gough modes: every pose that leg readings allow, each with its proof."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from gough.commands.options import PlatformName
+
+if TYPE_CHECKING:
+    from gough.checks import Array
+    from gough.modes.assembly import AssemblyModes
+    from gough.modes.choose import Choice
+    from gough.platform import Platform
+
+Legs = Annotated[Positional[tuple[str, ...]], arg(metavar="LEGS")]
+ROWS_PRINTED = 3  # sets of readings whose tables are printed
+
+
+def run(
+    legs: Legs = (),
+    *,
+    platform: PlatformName,
+    out: Annotated[str | None, arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")] = None,
+    plot: Annotated[str | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    threads: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+) -> int:
+    """Every pose that leg readings allow, each with its proof.
+
+    gough modes -p dietmaier
+
+    gough modes 652.1 660.3 655.0 648.8 671.2 639.9 -p reference --plot modes.png
+
+    Exit code 0: every list of poses is complete; 1: one may not be, or is invalid.
+
+    Args:
+        legs: six readings, or a .csv or .parquet file with columns leg_1 to leg_6; without
+            them, those of the home pose.
+        out: file to write, .csv or .parquet, one row for each pose; or - for CSV on standard
+            output.
+        plot: .png, .svg or .pdf to draw all poses of the first set of readings in.
+        threads: at most so many.
+    """
+    from gough.commands import show
+    from gough.modes.assembly import assembly_modes
+    from gough.modes.choose import choose_mode
+    from gough.platform import Platform
+
+    machine = Platform.load(platform)
+    modes = assembly_modes(machine, readings(legs, machine), threads=threads)
+    choice = choose_mode(modes)
+    _print(modes, choice, show.console_beside(out))
+    if out is not None:
+        _write(out, modes, choice)
+    if plot is not None:
+        from gough.plot.modes import modes_figure
+        from gough.plot.style import save
+
+        save(modes_figure(modes if modes.legs.ndim == 1 else modes[0]), plot)
+    return 0 if modes.complete.all() else 1
+
+
+def readings(legs: tuple[str, ...], platform: Platform) -> Array:
+    """Six numbers (6,), those in a file (N, 6), or those at home if nothing is given.
+
+    Raises:
+        InputError: neither six numbers nor a file that can be read.
+    """
+    if not legs:
+        return platform.home_legs
+    if len(legs) == 1 and (legs[0] == "-" or legs[0].lower().endswith((".csv", ".parquet"))):
+        from gough.files.whole import read_legs
+
+        return read_legs(legs[0], platform)
+    return six_numbers("LEGS", legs, "readings or a .csv or .parquet file")
+
+
+def six_numbers(name: str, values: tuple[str, ...], expected: str) -> Array:
+    """Six numbers from the command line, (6,).
+
+    Raises:
+        InputError: there are not six, or one is no number.
+    """
+    import numpy as np
+
+    from gough.errors import InputError
+
+    try:
+        numbers = np.array([float(v) for v in values])
+    except ValueError as error:
+        raise InputError(f"{name}: {error}; expected six {expected}") from None
+    if len(numbers) != 6:
+        raise InputError(f"{name}: expected six {expected}, found {len(numbers)}")
+    return numbers
+
+
+def _print(modes: AssemblyModes, choice: Choice, screen: Any) -> None:
+    """A table for each of the first sets of readings, and what is known about all."""
+    import numpy as np
+
+    sets = 1 if modes.legs.ndim == 1 else len(modes.legs)
+    for k in range(min(sets, ROWS_PRINTED)):
+        if np.any(modes.row == k):
+            screen.print(_table(modes, choice, k))
+        screen.print(_summary(modes, choice, k), markup=False)
+    if sets > ROWS_PRINTED:
+        found, whole = len(modes.row), int(modes.complete.sum())
+        screen.print(f"{sets} sets of readings, {found} poses; {whole} lists are complete.")
+
+
+def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
+    """The poses of one set, in 80 columns: five digits of a length; a file holds all."""
+    import numpy as np
+
+    from gough.commands.show import plain_table
+
+    heads = [">pose", ">x", ">y", ">z", ">rx_deg", ">ry_deg", ">rz_deg", ">proven"]
+    table = plain_table(*heads, "fails")
+    table.padding = 0
+    table.columns[-1].no_wrap = False
+    places = max(0, 4 - math.floor(math.log10(modes.platform.size)))
+    euler = np.degrees(modes.pose.euler)
+    certificate = modes.certificate
+    mine = np.flatnonzero(modes.row == k)
+    for i in mine[np.argsort(choice.rank[mine])]:
+        fails = [name for name, passed in choice.passes.items() if not passed[i]]
+        proof = f"{certificate.radius[i]:.1g}" if certificate.certified[i] else "no"
+        table.add_row(
+            str(choice.rank[i] + 1),
+            *(f"{v:z.{places}f}" for v in modes.pose.position[i]),
+            *(f"{v:z.2f}" for v in euler[i]),
+            proof,
+            " ".join(fails) or "-",
+        )
+    return table
+
+
+def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
+    import numpy as np
+
+    from gough.modes.result import ModesStatus
+
+    real, other, away, meet = modes.paths.reshape(-1, 4)[k]
+    mine = modes.row == k
+    status = ModesStatus(int(np.ravel(modes.status)[k]))
+    unit = f" {modes.platform.unit}" if modes.platform.unit else ""
+    passed = int(np.ravel(choice.count)[k])
+    lines = [
+        f"{modes.platform.name}, {status.label}: {mine.sum()} real poses, "
+        f"{int(modes.certified[mine].sum())} certified; of this machine's {modes.solutions} "
+        f"complex solutions {real} are real, {other} complex, {away} at infinity, {meet} in "
+        "multiple ones.",
+        status.text,
+    ]
+    if np.any(mine):
+        lines += [
+            f"{passed} of them pass{'es' if passed == 1 else ''} every filter "
+            f"({', '.join(choice.passes)}).",
+            "Proven: no other pose with these readings is within so much of the pose"
+            + (f" [{modes.platform.unit}]" if unit else "")
+            + f". Largest residual: {modes.residual[mine].max():.1e}{unit}.",
+        ]
+    return "\n".join(lines)
+
+
+def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
+    """One row for each pose."""
+    import numpy as np
+    import pyarrow as pa
+
+    from gough.files.block import label_column, number_column
+    from gough.files.whole import write_table
+    from gough.modes.result import ModesStatus
+
+    order = np.lexsort((choice.rank, modes.row))
+    truth = lambda values: pa.array(values[order].tolist(), pa.bool_())  # noqa: E731
+    number = lambda values: number_column(values[order])  # noqa: E731
+    columns = {"row": number(modes.row), "pose": number(choice.rank + 1)}
+    columns |= dict(zip("xyz", map(number, modes.pose.position.T), strict=True))
+    columns |= dict(zip(("qw", "qx", "qy", "qz"), map(number, modes.pose.wxyz.T), strict=True))
+    codes = np.ravel(modes.status)[modes.row][order]
+    columns["status"] = label_column(codes, [status.label for status in ModesStatus])
+    columns["residual"] = number(modes.residual)
+    columns["multiplicity"] = number(modes.multiplicity)
+    columns["certified"] = truth(modes.certified)
+    columns["radius"] = number(modes.certificate.radius)
+    columns["error"] = number(modes.certificate.error)
+    columns["sigma_min"] = number(modes.singularity_distance)
+    columns["sign"] = number(modes.sign)
+    columns |= {f"passes_{name}": truth(passed) for name, passed in choice.passes.items()}
+    write_table(path, columns, modes.platform)

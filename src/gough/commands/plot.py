@@ -1,0 +1,305 @@
+"""gough plot: figures for reports, each a command of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+from gough.commands.modes import Legs, readings, six_numbers
+from gough.commands.options import BlockRows, IgnorePlatform, KeepBadRows, PlatformName
+from gough.commands.solve import default_seed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gough.platform import Platform
+    from gough.pose import Pose
+
+Picture = Annotated[
+    str | None,
+    arg(
+        aliases=["-o"],
+        metavar="OUT",
+        help=".svg, .png or .pdf to write; without it a new PLATFORM_FIGURE.svg in this folder.",
+        help_behavior_hint="",
+    ),
+]
+Coordinate = Literal["x", "y", "z", "rx", "ry", "rz"]
+Value = Annotated[float | None, arg(metavar="V", help_behavior_hint="")]
+
+
+def pose(
+    pose: Annotated[Positional[tuple[str, ...]], arg(metavar="POSE")] = (),
+    *,
+    platform: PlatformName,
+    legs: Annotated[
+        tuple[str, str, str, str, str, str] | None,
+        arg(metavar="LEGS", help_behavior_hint=""),
+    ] = None,
+    row: Annotated[int, arg(metavar="N")] = 1,
+    out: Picture = None,
+) -> int:
+    """A pose in 3-D, with the readings of its legs within their strokes.
+
+    gough plot pose -p rubin_camera
+
+    gough plot pose 20 -10 610 5 3 -4 -p reference -o pose.svg
+
+    gough plot pose poses.parquet --row 17 -p reference
+
+    Args:
+        pose: x y z in the platform's unit and rx ry rz in degrees (R = Rx Ry Rz), or a .csv or
+            .parquet file of poses or leg readings; without it, and without --legs, home.
+        legs: six readings to solve, whose pose is drawn.
+        row: of the file, counted from 1.
+    """
+    from gough.plot.pose import pose_figure
+
+    machine = _machine(platform, out, "pose")
+    found = _pose(machine, pose, legs, row)
+    shift, turn = found.distance(machine.home)
+    ghost = machine.home if shift > 1e-9 * machine.size or turn > 1e-9 else None
+    return _save(pose_figure(machine, found, ghost=ghost), machine, out, "pose")
+
+
+def modes(legs: Legs = (), *, platform: PlatformName, out: Picture = None) -> int:
+    """All poses that six leg readings allow, in one figure; see gough modes.
+
+    gough plot modes -p dietmaier -o modes.svg
+
+    Args:
+        legs: six readings, or a .csv or .parquet file, of which the first row counts; without
+            them, those of the home pose.
+    """
+    from gough.modes.assembly import assembly_modes
+    from gough.plot.modes import modes_figure
+
+    machine = _machine(platform, out, "modes")
+    figure = modes_figure(assembly_modes(machine, readings(legs, machine).reshape(-1, 6)[0]))
+    return _save(figure, machine, out, "modes")
+
+
+def workspace(
+    *,
+    platform: PlatformName,
+    axes: Annotated[tuple[Coordinate, Coordinate], arg(metavar="A B")] = ("x", "y"),
+    x: Value = None,
+    y: Value = None,
+    z: Value = None,
+    rx: Value = None,
+    ry: Value = None,
+    rz: Value = None,
+    span: Annotated[
+        tuple[float, float, float, float] | None,
+        arg(metavar="A1 A2 B1 B2", help_behavior_hint=""),
+    ] = None,
+    resolution: Annotated[int, arg(metavar="N")] = 181,
+    out: Picture = None,
+) -> int:
+    """A slice of the workspace: distance to singularity, stroke limits.
+
+    gough plot workspace -p nasa_msfc --axes x z
+
+    gough plot workspace -p reachy_mini --axes rx ry --z 0.18 -o tilt.png
+
+    Lengths are in the platform's unit, angles (R = Rx Ry Rz) in degrees.
+
+    Args:
+        axes: two of x, y, z, rx, ry, rz.
+        x: held at this value, where it is no axis; else at home's, as are the others.
+        y: see x.
+        z: see x.
+        rx: see x.
+        ry: see x.
+        rz: see x.
+        span: lowest and highest value of the first, then of the second axis; without it a
+            little more than workspace and stroke allow.
+        resolution: poses along each axis.
+    """
+    from gough.plot.workspace import workspace_figure, workspace_slice
+
+    machine = _machine(platform, out, "workspace")
+    given = {"x": x, "y": y, "z": z, "rx": rx, "ry": ry, "rz": rz}
+    at = {name: value for name, value in given.items() if value is not None}
+    cut = workspace_slice(machine, axes, at=at, span=span, resolution=resolution)
+    return _save(workspace_figure(cut), machine, out, "workspace")
+
+
+def trajectory(
+    file: Annotated[Positional[str], arg(metavar="FILE")],
+    *,
+    platform: PlatformName,
+    time: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None,
+    out: Picture = None,
+    seed: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    keep_bad_rows: KeepBadRows = False,
+    ignore_platform: IgnorePlatform = False,
+    block_rows: BlockRows = 65536,
+) -> int:
+    """Leg readings and pose over the rows of a file, with the stroke limits.
+
+    gough plot trajectory legs.csv -p rubin_camera --time time
+
+    Rows without an answer are marked.
+
+    Of a long file, a band from the lowest to the highest of many rows is drawn.
+
+    Args:
+        file: .csv or .parquet with columns of poses or leg_1 to leg_6, or - for CSV on
+            standard input.
+        time: column of the horizontal axis; without it rows are counted.
+        seed: first guess for leg readings, as in gough solve.
+    """
+    from gough.commands.options import reading_options
+    from gough.plot.rows import read_trajectory
+    from gough.plot.trajectory import note, trajectory_figure
+
+    machine = _machine(platform, out, "trajectory")
+    reading = reading_options("", keep_bad_rows, ignore_platform, block_rows)
+    with _ticking() as tick:
+        envelope = read_trajectory(
+            file, machine, time=time, seed=seed or default_seed(machine), reading=reading, tick=tick
+        )
+    figure = trajectory_figure(machine, envelope, time=time or "row",
+                               title=f"{machine.name}: {_name(file)}")  # fmt: skip
+    code = _save(figure, machine, out, "trajectory")
+    said = note(envelope).replace("\N{MULTIPLICATION SIGN} ", "")
+    if said:
+        print(said)
+    return code
+
+
+def errors(
+    files: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE")],
+    *,
+    platform: PlatformName,
+    truth: Annotated[str | None, arg(metavar="POSES", help_behavior_hint="")] = None,
+    out: Picture = None,
+    keep_bad_rows: KeepBadRows = False,
+    ignore_platform: IgnorePlatform = False,
+    block_rows: BlockRows = 65536,
+) -> int:
+    """Histograms of residuals and errors of solved files, on logarithmic axes.
+
+    gough plot errors poses.parquet -p reference
+
+    gough plot errors home.csv disgnet.csv -p reference --truth true.csv
+
+    Args:
+        files: .csv or .parquet as gough solve writes them, one or several to compare.
+        truth: the true poses, row for row, to compare the files' poses with.
+    """
+    from gough.commands.options import reading_options
+    from gough.errors import InputError
+    from gough.plot.histograms import histogram_figure
+    from gough.plot.rows import read_errors
+    from gough.plot.style import length_unit
+
+    if not files:
+        raise InputError("FILE: expected a .csv or .parquet file that gough solve wrote")
+    machine = _machine(platform, out, "errors")
+    reading = reading_options("", keep_bad_rows, ignore_platform, block_rows)
+    unit = length_unit(machine)
+    labels = {
+        "residual": f"residual: largest leg error [{unit}]",
+        "shift": f"position error [{unit}]",
+        "turn": "rotation error [deg]",
+    }
+    panels: dict[str, dict[str, Any]] = {}
+    for file in files:
+        with _ticking() as tick:
+            found = read_errors(file, machine, truth, reading=reading, tick=tick)
+        for quantity, histogram in found.items():
+            panels.setdefault(labels[quantity], {})[file] = histogram
+    return _save(histogram_figure(panels, title=machine.name), machine, out, "errors")
+
+
+FIGURES: dict[str, Callable[..., int]] = {
+    "pose": pose,
+    "modes": modes,
+    "workspace": workspace,
+    "trajectory": trajectory,
+    "errors": errors,
+}
+
+
+# ---- parts ----------------------------------------------------------------------------
+
+
+def _pose(
+    machine: Platform, given: tuple[str, ...], legs: tuple[str, ...] | None, row: int
+) -> Pose:
+    """The pose that the command line means."""
+    import numpy as np
+
+    from gough.errors import InputError
+    from gough.fk.solve import solve
+    from gough.plot.rows import read_pose
+    from gough.pose import Pose
+
+    if legs is not None:
+        if given:
+            raise InputError("POSE, --legs: pass one of them, not both")
+        values = six_numbers("--legs", legs, "readings")
+        solution = solve(machine, values, seed=default_seed(machine))
+        print(f"{solution.status.label}: {solution.status.text}")
+        return solution.pose
+    if not given:
+        return machine.home
+    if len(given) == 1 and (given[0] == "-" or given[0].lower().endswith((".csv", ".parquet"))):
+        return read_pose(given[0], machine, row, default_seed(machine))
+    values = six_numbers("POSE", given, "numbers x y z rx ry rz, or a .csv or .parquet file")
+    if not np.all(np.isfinite(values)):
+        raise InputError(f"POSE: expected six finite numbers, found {' '.join(given)}")
+    return Pose.from_euler(values[:3], np.radians(values[3:]))
+
+
+def _machine(platform: str, out: str | None, figure: str) -> Platform:
+    """The platform; that the picture can be written is checked before any work is done."""
+    from gough.files.replace import check_target
+    from gough.platform import Platform
+    from gough.plot.style import check_ending
+
+    machine = Platform.load(platform)
+    path = _target(machine, out, figure)
+    check_ending(path)
+    check_target(path)
+    return machine
+
+
+def _target(machine: Platform, out: str | None, figure: str) -> str:
+    """The picture's name: the one given, or a new one in this folder."""
+    from gough.errors import GoughError
+
+    if out is not None:
+        return out
+    name = "".join(c if c.isalnum() or c in "-." else "_" for c in machine.name) or "platform"
+    path = f"{name}_{figure}.svg"
+    if Path(path).exists():
+        raise GoughError(f"{path}: is there already; pass -o {path} to replace it, or another name")
+    return path
+
+
+def _save(figure: Figure, machine: Platform, out: str | None, name: str) -> int:
+    from gough.plot.style import save
+
+    path = _target(machine, out, name)
+    save(figure, path)
+    print(f"{path}: written, {Path(path).stat().st_size / 1000:.0f} kB")
+    return 0
+
+
+@contextmanager
+def _ticking():
+    """What to call after every block: it ends the command if a signal has asked for it."""
+    from gough.commands import stopping
+
+    yield lambda source: stopping.check()
+
+
+def _name(file: str) -> str:
+    return "standard input" if file == "-" else Path(file).name

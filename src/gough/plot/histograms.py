@@ -1,0 +1,160 @@
+"""Histograms of residuals and errors over many decades."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+
+from gough.checks import Array
+from gough.errors import GoughError
+from gough.plot.style import CURVES, GREY, new_figure, styled
+
+PER_DECADE = 5
+LOWEST, HIGHEST = -320, 310  # decades that float64 has
+
+
+class LogHistogram:
+    """How many values fall into each fifth of a decade; any number of them, in little memory.
+
+    Attributes:
+        count: finite values seen.
+        zeros: how many of them are exactly zero.
+        left_out: values that are NaN or infinite.
+        largest: the largest value, exactly.
+    """
+
+    def __init__(self) -> None:
+        self.count, self.zeros, self.left_out, self.largest = 0, 0, 0, 0.0
+        self._bins = np.zeros((HIGHEST - LOWEST) * PER_DECADE, dtype=np.int64)
+
+    @classmethod
+    def of(cls, values: Array) -> LogHistogram:
+        """The histogram of values (N,)."""
+        histogram = cls()
+        histogram.add(values)
+        return histogram
+
+    def add(self, values: Array) -> None:
+        """More values (n,), none below zero."""
+        finite = values[np.isfinite(values)]
+        self.left_out += len(values) - len(finite)
+        if not len(finite):
+            return
+        if finite.min() < 0:
+            raise GoughError(f"errors: expected values of 0 or more, found {finite.min():g}")
+        self.count += len(finite)
+        self.largest = max(self.largest, float(finite.max()))
+        above = finite[finite > 0]
+        self.zeros += len(finite) - len(above)
+        places = np.floor((np.log10(above) - LOWEST) * PER_DECADE).astype(np.int64)
+        self._bins += np.bincount(np.clip(places, 0, len(self._bins) - 1),
+                                  minlength=len(self._bins))  # fmt: skip
+
+    @property
+    def range(self) -> tuple[int, int]:
+        """The decades [first, last) that hold values above zero; (0, 0) if none does."""
+        found = np.flatnonzero(self._bins)
+        if not len(found):
+            return 0, 0
+        return (int(found[0] // PER_DECADE) + LOWEST, int(found[-1] // PER_DECADE) + LOWEST + 1)
+
+    def shares(self, first: int, last: int) -> Array:
+        """Share of all values in each bin of the decades [first, last)."""
+        part = slice((first - LOWEST) * PER_DECADE, (last - LOWEST) * PER_DECADE)
+        return self._bins[part] / max(self.count, 1)
+
+    def quantile(self, share: float) -> float:
+        """A value that at least `share` of all do not exceed: the upper edge of its bin."""
+        wanted = int(np.ceil(share * self.count)) - self.zeros
+        if wanted <= 0:
+            return 0.0
+        place = int(np.searchsorted(np.cumsum(self._bins), wanted))
+        return min(10.0 ** ((place + 1) / PER_DECADE + LOWEST), self.largest)
+
+
+@styled
+def histogram_figure(
+    panels: Mapping[str, Mapping[str, LogHistogram]], *, title: str = ""
+) -> Figure:
+    """One panel for each quantity, with a line for each series.
+
+    Args:
+        panels: label of the horizontal axis, with its unit in brackets -> name -> histogram.
+    """
+    figure = new_figure(7.6, 0.7 + 2.6 * len(panels))
+    axes = np.atleast_1d(figure.subplots(len(panels), 1))
+    for panel, (label, series) in zip(axes, panels.items(), strict=True):
+        draw_histogram(panel, series, label)
+    figure.suptitle(title)
+    return figure
+
+
+def draw_histogram(axes: Axes, series: Mapping[str, LogHistogram], label: str) -> None:
+    """Shares of values in each fifth of a decade, both axes logarithmic.
+
+    Values of exactly zero have no place on a logarithmic axis: they stand at the left, at the
+    mark 0. The legend tells how many values there are, and the largest.
+
+    Args:
+        series: name -> histogram.
+        label: of the horizontal axis, with its unit in brackets.
+    """
+    ranges = [h.range for h in series.values() if h.range != (0, 0)] or [(0, 1)]
+    first, last = min(r[0] for r in ranges), max(r[1] for r in ranges)
+    edges = np.logspace(first, last, (last - first) * PER_DECADE + 1)
+    zero = 10.0 ** (first - 0.6)
+    lowest = 1.0
+    for (name, histogram), (color, line) in zip(series.items(), _cycle(len(series)), strict=True):
+        shares = histogram.shares(first, last)
+        none = histogram.zeros / max(histogram.count, 1)
+        seen = [s for s in (*shares, none) if s > 0]
+        lowest = min([lowest, *seen])
+        axes.stairs(shares, edges, color=color, linestyle=line, linewidth=1.5, baseline=None,
+                    label=_legend(name, histogram))  # fmt: skip
+        axes.stairs(shares, edges, color=color, fill=True, alpha=0.12, baseline=1e-12)
+        if none:
+            axes.plot(zero, none, "D", color=color, markersize=6)
+    zeros = any(h.zeros for h in series.values())
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="share of rows")
+    axes.set_xlim(10.0 ** (first - (1.0 if zeros else 0.1)), 10.0 ** (last + 0.1))
+    axes.set_ylim(10.0 ** np.floor(np.log10(lowest)) * 0.8, 1.6)
+    _decades(axes, first, last, zero if zeros else None)
+    axes.legend(loc="upper left", bbox_to_anchor=(0, -0.24), alignment="left")
+
+
+def _decades(axes: Axes, first: int, last: int, zero: float | None) -> None:
+    """A tick for each decade, or every few, and one for zero."""
+    step = max(1, round((last - first) / 12))
+    powers = list(range(first, last + 1, step))
+    ticks = [10.0**p for p in powers] + ([] if zero is None else [zero])
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
+
+    def text(value: float, _: int) -> str:
+        if zero is not None and abs(value / zero - 1) < 1e-6:
+            return "0"
+        return rf"$10^{{{round(np.log10(value))}}}$"
+
+    axes.xaxis.set_major_formatter(FuncFormatter(text))
+    axes.xaxis.set_minor_locator(FixedLocator([]))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    if zero is not None:
+        axes.axvline(zero * 10**0.3, color=GREY, linewidth=0.7, linestyle=":")
+
+
+def _legend(name: str, histogram: LogHistogram) -> str:
+    if not histogram.count:
+        return f"{name}: no value"
+    middle, tail = histogram.quantile(0.5), histogram.quantile(0.99)
+    text = (
+        f"{name}: {histogram.count:,} rows, half below {middle:.1g}, 99 % below {tail:.1g}, "
+        f"largest {histogram.largest:.2g}"
+    )
+    return text + (f"; {histogram.left_out:,} left out" if histogram.left_out else "")
+
+
+def _cycle(count: int) -> list:
+    return [CURVES[i % len(CURVES)] for i in range(count)]

@@ -1,0 +1,230 @@
+"""What the rows of a file show: trajectories and errors, a block at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gough.checks import Array
+from gough.errors import InputError
+from gough.files.block import Block
+from gough.files.identity import check_same
+from gough.files.names import LEGS, STATUS, checked, leg_columns, pose_columns
+from gough.files.placing import poses_from_columns
+from gough.files.source import Reading, Source, open_source
+from gough.fk.solve import solve
+from gough.fk.status import Status
+from gough.kinematics import leg_lengths
+from gough.platform import Platform
+from gough.plot.envelope import Envelope
+from gough.plot.histograms import LogHistogram
+from gough.plot.trajectory import SIGNALS, signals
+from gough.pose import Pose
+
+RESIDUAL = "residual"
+UNUSABLE = tuple(s.label for s in Status if not s.usable)
+Tick = Callable[[Source], None]
+
+
+def read_trajectory(
+    path: str | Path,
+    platform: Platform,
+    *,
+    time: str | None = None,
+    seed: str = "auto",
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+    tick: Tick | None = None,
+) -> Envelope:
+    """The envelope of a file of poses or of leg readings, for `trajectory_figure`.
+
+    A file with the columns of a pose is taken for poses, and legs are calculated; any other
+    must have leg_1 to leg_6, which are solved. Rows whose status is not usable, and those
+    without numbers, count as rows without an answer.
+
+    Args:
+        time: the column that gives the horizontal axis; without it rows are counted from 1.
+        seed: first guess for leg readings, as for `gough.solve`.
+        tick: called after every block.
+
+    Raises:
+        GoughError, InputError: what is wrong, where and what to do.
+    """
+    envelope = Envelope(SIGNALS)
+    with closing(open_source(path)) as source:
+        names, poses = _pose_or_legs(source)
+        for block in _blocks(source, platform, names, reading, time):
+            if poses:
+                pose, answered = _poses(block, names)
+                with np.errstate(invalid="ignore"):
+                    legs = leg_lengths(platform, pose)
+                answered &= np.all(np.isfinite(legs), axis=-1)
+            else:
+                legs = block.numbers(LEGS)
+                solution = solve(platform, legs, seed=seed)
+                pose, answered = solution.pose, solution.usable
+            x = envelope.rows + 1.0 + np.arange(len(block))
+            if time is not None:
+                x = block.numbers([time])[:, 0]
+                answered = answered & np.isfinite(x)
+            envelope.add(x, signals(platform, legs, pose.position, pose.euler), answered)
+            if tick:
+                tick(source)
+    return envelope
+
+
+def read_errors(
+    path: str | Path,
+    platform: Platform,
+    truth: str | Path | None = None,
+    *,
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+    tick: Tick | None = None,
+) -> dict[str, LogHistogram]:
+    """Histograms of a file of solved poses: "residual" and, with the truth, "shift" and "turn".
+
+    Rows whose status is not usable are left out, and counted as such.
+
+    Args:
+        path: poses, as `gough solve` writes them.
+        truth: the true poses, row for row.
+
+    Returns:
+        "residual" [platform unit] where the file has that column; "shift" [platform unit] and
+        "turn" [deg] where there is a truth.
+
+    Raises:
+        GoughError, InputError: what is wrong; the files' rows do not match; neither a column of
+            residuals nor a truth.
+    """
+    with closing(open_source(path)) as source:
+        residual = (RESIDUAL,) if RESIDUAL in source.columns else ()
+        if truth is None and not residual:
+            raise InputError(
+                f"{path}: no column residual, as gough solve writes it; pass --truth POSES to "
+                "compare its poses with true ones"
+            )
+        names = pose_columns(source.where, source.columns) if truth is not None else ()
+        found = {name: LogHistogram() for name in residual}
+        found |= {} if truth is None else {"shift": LogHistogram(), "turn": LogHistogram()}
+        true = None if truth is None else _Feed(truth, platform, reading)
+        for block in _blocks(source, platform, (*names, *residual), reading, None):
+            answered = _usable(block)
+            if residual:
+                values = block.numbers(residual)[:, 0]
+                found[RESIDUAL].add(np.where(answered, values, np.nan))
+            if true is not None:
+                pose, finite = _poses(block, names)
+                shift, turn = pose.distance(true.take(len(block), source.where))
+                answered &= finite
+                found["shift"].add(np.where(answered, shift, np.nan))
+                found["turn"].add(np.where(answered, np.degrees(turn), np.nan))
+            if tick:
+                tick(source)
+        if true is not None:
+            true.finish(source.where)
+    return found
+
+
+def read_pose(path: str | Path, platform: Platform, row: int, seed: str = "auto") -> Pose:
+    """The pose in one row of a file of poses, or that of one row of leg readings.
+
+    Args:
+        row: counted from 1.
+
+    Raises:
+        InputError: there is no such row, or it has no pose.
+    """
+    seen = 0
+    with closing(open_source(path)) as source:
+        names, poses = _pose_or_legs(source)
+        for block in _blocks(source, platform, names, Reading(), None):
+            if seen < row <= seen + len(block):
+                values = block.numbers(names)[row - seen - 1 : row - seen]
+                pose = poses_from_columns(values, names)[0][0] if poses else (
+                    solve(platform, values[0], seed=seed).pose
+                )  # fmt: skip
+                if not np.all(np.isfinite(pose.position)):
+                    raise InputError(f"{path}: row {row} has no pose that could be drawn")
+                return pose
+            seen += len(block)
+    raise InputError(f"{path}: there is no row {row}: rows are 1 to {seen}")
+
+
+# ---- parts ----------------------------------------------------------------------------
+
+
+def _pose_or_legs(source: Source) -> tuple[tuple[str, ...], bool]:
+    """The columns to read, and whether they are those of a pose."""
+    try:
+        return pose_columns(source.where, source.columns), True
+    except InputError:
+        if any(name in source.columns for name in LEGS):
+            return leg_columns(source.where, source.columns), False
+        raise InputError(
+            f"{source.where}: holds neither legs nor poses; expected columns leg_1 to leg_6, or "
+            "x, y, z and one of qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg"
+        ) from None
+
+
+def _blocks(
+    source: Source, platform: Platform, names: Sequence[str], reading: Reading, time: str | None
+) -> Iterator[Block]:
+    """The file's blocks with these number columns, and its status where it has one."""
+    if not reading.ignore_platform:
+        check_same(source.where, source.metadata, platform)
+    if time is not None:
+        checked(source.where, source.columns, (time,))
+    keep = (STATUS,) if STATUS in source.columns and STATUS not in names else ()
+    numbers = tuple(dict.fromkeys([*names, *([time] if time else [])]))
+    return source.blocks(numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
+
+
+def _poses(block: Block, names: Sequence[str]) -> tuple[Pose, NDArray[np.bool_]]:
+    """Poses (n,) of a block, and which of them are answers."""
+    pose, _ = poses_from_columns(block.numbers(names), names)
+    return pose, _usable(block) & np.isfinite(pose.position[:, 0])
+
+
+def _usable(block: Block) -> NDArray[np.bool_]:
+    """Rows (n,) whose status, if there is one, does not say that they have no answer."""
+    if STATUS not in block.table.column_names:
+        return np.ones(len(block), dtype=bool)
+    words = np.array(block.table.column(STATUS).to_pylist(), dtype=object)
+    return ~np.isin(words.astype(str), UNUSABLE)
+
+
+class _Feed:
+    """Poses of a file, as many at a time as are asked for."""
+
+    def __init__(self, path: str | Path, platform: Platform, reading: Reading) -> None:
+        self._source = open_source(path)
+        self._names = pose_columns(self._source.where, self._source.columns)
+        self._blocks = _blocks(self._source, platform, self._names, reading, None)
+        self._values: Array = np.empty((0, len(self._names)))
+
+    def take(self, count: int, beside: str) -> Pose:
+        """The next `count` poses."""
+        while len(self._values) < count:
+            block = next(self._blocks, None)
+            if block is None:
+                raise InputError(
+                    f"{self._source.where}: has fewer rows than {beside}; expected one true pose "
+                    "for each"
+                )
+            self._values = np.concatenate([self._values, block.numbers(self._names)])
+        values, self._values = self._values[:count], self._values[count:]
+        return poses_from_columns(values, self._names)[0]
+
+    def finish(self, beside: str) -> None:
+        """That nothing is left over."""
+        left = len(self._values) or len(next(self._blocks, ()))
+        self._source.close()
+        if left:
+            raise InputError(
+                f"{self._source.where}: has more rows than {beside}; expected one true pose for "
+                "each"
+            )
