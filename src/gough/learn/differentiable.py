@@ -1,4 +1,4 @@
-"""Forward and inverse kinematics as torch functions: `gough.learn.solve`, `gough.learn.leg_lengths`."""
+"""Forward and inverse kinematics as torch functions that carry gradients."""
 
 from __future__ import annotations
 

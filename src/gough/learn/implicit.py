@@ -38,8 +38,8 @@ def implicit_pose(
         Positions (N, 3) and rotations (N, 3, 3).
     """
     names, tensors = zip(*platform.named_buffers(), strict=True)
-    out = _ImplicitPose.apply(platform, names, solved, position, rotation, legs, *tensors)
-    return out  # pyright: ignore[reportReturnType]
+    arguments = (platform, names, solved, position, rotation, legs, *tensors)
+    return _ImplicitPose.apply(*arguments)  # pyright: ignore[reportReturnType]
 
 
 class _ImplicitPose(torch.autograd.Function):
