@@ -8,7 +8,7 @@ its Jacobian has no inverse, or when it runs away. Derivations: docs/gpu_newton.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -20,6 +20,7 @@ from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.learn import se3
 from gough.learn.geometry import TorchPlatform, quaternion_to_matrix
+from gough.learn.implicit import implicit_pose
 from gough.learn.inverse import approximate_inverse
 from gough.platform import Platform
 from gough.pose import Pose
@@ -159,7 +160,6 @@ def batched_newton(
     )  # fmt: skip
 
 
-@torch.no_grad()
 def refine(
     platform: TorchPlatform,
     position: Tensor,
@@ -171,16 +171,30 @@ def refine(
     z_max: int = 100,
     scaled: bool = False,
 ) -> Refined:
-    """As `batched_newton`, for tensors on any device: (N, 3), (N, 3, 3) and (N, 6)."""
+    """As `batched_newton`, for tensors on any device: (N, 3), (N, 3, 3) and (N, 6).
+
+    Where legs or the platform's joints (`TorchPlatform.with_joints`) require gradients, the poses
+    of converged rows carry them; see `implicit_pose`.
+    """
     if not gamma > 0 or f_max < 0 or z_max < 0:
         raise GoughError(
             f"gamma, f_max, z_max: expected above 0, 0 or more and 0 or more, found {gamma}, "
             f"{f_max}, {z_max}"
         )
-    rows = _Rows(platform, position, rotation, legs)
+    with torch.no_grad():
+        end = _sweep(
+            platform, _Rows(platform, position, rotation, legs), gamma, f_max, z_max, scaled
+        )
+    converged = end.outcome == Outcome.CONVERGED
+    position, rotation = implicit_pose(platform, end.position, end.rotation, legs, converged)
+    return replace(end, position=position, rotation=rotation)
+
+
+def _sweep(platform: TorchPlatform, rows: _Rows, gamma: float, f_max: int, z_max: int,
+           scaled: bool) -> Refined:  # fmt: skip
     size = platform.platform.size
     reach = FAR * (size + float(np.linalg.norm(platform.platform.home.position)))
-    units = legs.new_tensor([1, 1, 1, size, size, size] if scaled else [1] * 6)
+    units = rows.xi.new_tensor([1, 1, 1, size, size, size] if scaled else [1] * 6)
     sweeps = 0
     while len(rows.left) and sweeps < z_max:
         sweeps += 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import torch
 from torch import Tensor, nn
 
@@ -45,6 +47,29 @@ class TorchPlatform(nn.Module):
         for name, value in facts.items():
             self.register_buffer(name, torch.tensor(value, dtype=dtype), persistent=False)
 
+    def with_joints(self, base: Tensor | None = None, moving: Tensor | None = None
+                    ) -> TorchPlatform:  # fmt: skip
+        """The same machine with other joints (6, 3), or (N, 6, 3) for one machine a row.
+
+        Gradients flow to the tensors given. Lengths at home, from which changes of length count,
+        are those of the new joints.
+        """
+        values = dict(self.named_buffers())
+        if base is not None:
+            values["base"] = base
+        if moving is not None:
+            values["arms"] = moving - self.pivot
+        other = self.with_facts(values)
+        no_turn = torch.eye(3, dtype=self.base.dtype, device=self.base.device)
+        struts, _ = other.struts(torch.zeros_like(self.origin), no_turn)
+        return other.with_facts(values | {"home_lengths": torch.linalg.vector_norm(struts, dim=-1)})
+
+    def with_facts(self, values: dict[str, Tensor]) -> TorchPlatform:
+        """The same machine with other tensors under the names of its buffers."""
+        other = copy.copy(self)
+        other._buffers = dict(values)
+        return other
+
     def rotation(self, turn: Tensor) -> Tensor:
         """The pose's rotation matrices (..., 3, 3)."""
         return self.home_rotation @ turn
@@ -83,13 +108,24 @@ class TorchPlatform(nn.Module):
 
     def legs(self, shift: Tensor, turn: Tensor) -> Tensor:
         """Readings (..., 6); NaN where a motor cannot reach."""
-        struts, _ = self.struts(shift, turn)
+        return self._readings(self.struts(shift, turn)[0])
+
+    def legs_at(self, position: Tensor, rotation: Tensor) -> Tensor:
+        """Readings (..., 6) of poses (..., 3), (..., 3, 3) in base coordinates."""
+        return self._readings(self._struts_at(position, rotation)[0])
+
+    def _readings(self, struts: Tensor) -> Tensor:
         if self.platform.rotary is not None:
             return self._motor_angles(struts)
         lengths = torch.linalg.vector_norm(struts, dim=-1)
         if self.platform.legs == "length_change":
             return lengths - self.home_lengths
         return lengths
+
+    def _struts_at(self, position: Tensor, rotation: Tensor) -> tuple[Tensor, Tensor]:
+        """As `struts`, for poses in base coordinates."""
+        arms = self.arms @ rotation.mT
+        return arms + (position + self.pivot)[..., None, :] - self.base, arms
 
     def _motor_angles(self, joint: Tensor) -> Tensor:
         """See `gough.kinematics._motor_angles`."""
