@@ -54,6 +54,24 @@ class LogHistogram:
         self._bins += np.bincount(np.clip(places, 0, len(self._bins) - 1),
                                   minlength=len(self._bins))  # fmt: skip
 
+    def as_dict(self) -> dict:
+        """What JSON can hold; `from_dict` takes it back."""
+        first, last = self.range
+        return {
+            "first": first, "last": last, "bins": self._bins[_bins(first, last)].tolist(),
+            "count": self.count, "zeros": self.zeros, "left_out": self.left_out,
+            "largest": self.largest,
+        }  # fmt: skip
+
+    @classmethod
+    def from_dict(cls, facts: dict) -> LogHistogram:
+        """The histogram that `as_dict` told of."""
+        histogram = cls()
+        histogram.count, histogram.zeros = facts["count"], facts["zeros"]
+        histogram.left_out, histogram.largest = facts["left_out"], facts["largest"]
+        histogram._bins[_bins(facts["first"], facts["last"])] = facts["bins"]
+        return histogram
+
     @property
     def range(self) -> tuple[int, int]:
         """The decades [first, last) that hold values above zero; (0, 0) if none does."""
@@ -64,8 +82,7 @@ class LogHistogram:
 
     def shares(self, first: int, last: int) -> Array:
         """Share of all values in each bin of the decades [first, last)."""
-        part = slice((first - LOWEST) * PER_DECADE, (last - LOWEST) * PER_DECADE)
-        return self._bins[part] / max(self.count, 1)
+        return self._bins[_bins(first, last)] / max(self.count, 1)
 
     def quantile(self, share: float) -> float:
         """A value that at least `share` of all do not exceed: the upper edge of its bin."""
@@ -124,6 +141,11 @@ def draw_histogram(axes: Axes, series: Mapping[str, LogHistogram], label: str) -
     axes.set_ylim(10.0 ** np.floor(np.log10(lowest)) * 0.8, 1.6)
     _decades(axes, first, last, zero if zeros else None)
     axes.legend(loc="upper left", bbox_to_anchor=(0, -0.24), alignment="left")
+
+
+def _bins(first: int, last: int) -> slice:
+    """Where the bins of the decades [first, last) stand."""
+    return slice((first - LOWEST) * PER_DECADE, (last - LOWEST) * PER_DECADE)
 
 
 def _decades(axes: Axes, first: int, last: int, zero: float | None) -> None:
