@@ -106,12 +106,15 @@ def _one(equations: Equations, xi: Array, gamma: float, z_max: int) -> tuple:
 
 
 def scipy_root(platform: Platform, guess: Pose, legs: Array, *, gamma: float) -> Refined:
-    """SciPy's `root` (MINPACK hybrj) on the same equations, one sample at a time."""
+    """SciPy's `root` (MINPACK hybrj) on the same equations, one sample at a time.
+
+    Its tolerance is relative to the unknowns, so gamma is divided by the platform's size.
+    """
     from scipy.optimize import root
 
     starts = guess.log()
     ends = [
-        root(Equations(platform, reading), xi, jac=True, tol=gamma)
+        root(Equations(platform, reading), xi, jac=True, tol=gamma / platform.size)
         for xi, reading in zip(starts, legs, strict=True)
     ]
     xi = np.array([end.x for end in ends])

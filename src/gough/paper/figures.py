@@ -9,12 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gough.paper.study import Study
-from gough.plot.histograms import LogHistogram, draw_histogram
+from gough.plot.histograms import LogHistogram, histogram_figure
 from gough.plot.pose import PoseStyle, draw_pose, pose_axes
 from gough.plot.style import (
     BLUE,
     CURVES,
-    FAINT,
     INK,
     VERMILION,
     length_unit,
@@ -25,8 +24,9 @@ from gough.plot.style import (
 from gough.pose import Pose
 
 WIDTH = 8.0  # inches
-TRUTH = PoseStyle(plate=FAINT, width=4.0, fill=0.0, legs=FAINT, numbers=False)
-SOLVED = PoseStyle(plate=BLUE, width=1.2, fill=0.15, base=False, numbers=False)
+TRUTH = PoseStyle(width=3.5, numbers=False)
+SOLVED = PoseStyle(plate=VERMILION, line="--", width=1.2, fill=0.0, legs=INK, base=False,
+                   numbers=False)  # fmt: skip
 
 
 def draw_all(study: Study) -> list[str]:
@@ -96,8 +96,8 @@ def solved_poses(study: Study) -> Figure:
     left, turned = solved.distance(truth)
     unit = length_unit(study.platform)
     figure = new_figure(WIDTH, 0.62 * WIDTH)
-    for i in range(len(truth)):
-        axes = pose_axes(figure, study.platform, [truth[i], solved[i]], (2, 4, i + 1))
+    for i, place in enumerate(figure.add_gridspec(2, 4)):
+        axes = pose_axes(figure, study.platform, [truth[i], solved[i]], place)
         draw_pose(axes, study.platform, truth[i], style=TRUTH)
         draw_pose(axes, study.platform, solved[i], style=SOLVED)
         axes.set(xticklabels=[], yticklabels=[], zticklabels=[], xlabel="", ylabel="", zlabel="")
@@ -110,15 +110,12 @@ def solved_poses(study: Study) -> Figure:
 def error_histograms(study: Study) -> Figure:
     """Errors of the guesses and after the second stage, on a log axis."""
     result = study.result("errors")
-    figure, axes = _panels(2)
     unit = length_unit(study.platform)
-    for axis, key, label in (
-        (axes[0], "trans", f"translation error [{unit}]"),
-        (axes[1], "rot_deg", "rotation error [deg]"),
-    ):
-        found = {name: LogHistogram.from_dict(h) for name, h in result[key].items()}
-        draw_histogram(axis, found, label)
-    return figure
+    labels = {"trans": f"translation error [{unit}]", "rot_deg": "rotation error [deg]"}
+    return histogram_figure({
+        label: {name: LogHistogram.from_dict(h) for name, h in result[key].items()}
+        for key, label in labels.items()
+    })  # fmt: skip
 
 
 def _times(study: Study, names: tuple[str, str]) -> Figure:

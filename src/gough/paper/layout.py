@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-NOTHING = "not given"  # in the paper
+NOTHING = "n/a"  # the paper has no such number
 
 _PAGE = """<!doctype html>
 <html lang="en">
@@ -23,7 +23,7 @@ table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.85rem; }}
 th, td {{ padding: 0.25rem 0.6rem; border-bottom: 1px solid #ddd; text-align: right; }}
 th {{ border-bottom: 2px solid #888; vertical-align: bottom; }}
 th:first-child, td:first-child {{ text-align: left; }}
-svg {{ max-width: 100%; height: auto; }}
+svg {{ width: 100%; height: auto; }}
 code {{ background: #f3f3f3; padding: 0.1em 0.3em; }}
 h1, h2 {{ line-height: 1.2; }}
 </style>

@@ -34,7 +34,8 @@ Gough-Stewart Platform*: 1200 epochs of training, and times of one RTX 3090. It 
 joints of its platform, so absolute errors need not agree; what can be compared is what it claims
 about methods. Everything else on this page was computed by `gough paper`, and can be computed
 again: `gough paper --stage NAME -o FOLDER` repeats one table from the networks in the folder, with
-the same accuracy figures to the last digit. Times differ.
+the same accuracy figures to the last digit. Times differ. "{NOTHING}" stands where the paper has no
+number.
 
 **Data.** The full training set is the first {plan.rows:,} rows of `gough dataset --seed
 {plan.seed}`, the others the first 90 and 80 % of these. Errors are means over {plan.test:,}
@@ -205,8 +206,9 @@ def figures(study: Study) -> str:
         ("newton_times", f"Time of the second stage alone from DisGNet's guesses, gamma = "
                          f"{gamma:g}: one sample at a time, and batched.", "times"),
         ("two_stage_times", f"Time of both stages, gamma = {gamma:g}.", "times"),
-        ("solved_poses", "Eight held-out poses after both stages (blue) over the true ones (grey), "
-                         "gamma = 0.0001; above each the error of the guess and what is left.",
+        ("solved_poses", "Eight held-out poses after both stages (dashed plate, thin legs) over "
+                         "the true ones (filled plate, thick legs), gamma = 0.0001; above each the "
+                         "error of the guess and what is left.",
          "poses"),
         ("error_histograms", "Errors of the first guesses, and after the second stage.", "errors"),
     ):  # fmt: skip
