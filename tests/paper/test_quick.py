@@ -1,0 +1,150 @@
+"""`gough paper --quick`, once and whole, and what can be done with its folder."""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+from cli.conftest import Result, process
+
+from gough.learn.checkpoint import load_tensors
+from gough.paper.plan import SETS, Plan
+from gough.paper.study import Study
+from gough.platform import Platform
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("paper") / "study"
+    done = paper("-o", folder, "--quick")
+    assert done.code == 0, done.err
+    return folder
+
+
+def paper(*arguments: object) -> Result:
+    return process("paper", *arguments, timeout=600)
+
+
+def test_every_table_is_filled_and_every_figure_there(study):
+    text = (study / "index.md").read_text()
+    for line in text.splitlines():
+        if line.startswith("|"):
+            assert all(cell.strip() for cell in line.strip("|").split("|")), line
+    for heading in ("The paper's claims", "First guesses", "training sets", "Two-stage methods",
+                    "Number of iterations", "A wide workspace", "Figures"):  # fmt: skip
+        assert heading in text
+    figures = re.findall(r"\]\((figures/\w+\.svg)\)", text)
+    assert len(figures) == 6
+    assert all((study / name).stat().st_size > 5000 for name in figures)
+    assert "nan" not in text.lower().replace("finance", "")
+
+
+def test_the_page_stands_alone(study):
+    page = (study / "report.html").read_text()
+    assert page.count("<svg") == 6
+    assert not re.search(r'(?:src|href)="(?!#|data:)', page)  # nothing is fetched
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+
+
+def test_all_networks_had_their_steps(study):
+    plan = Plan.load(study / "plan.json")
+    for name in SETS:
+        for kind, steps in plan.steps.items():
+            _, facts = load_tensors(study / "runs" / name / kind / "weights.safetensors")
+            assert facts["record"]["steps"] == steps
+            assert facts["record"]["samples"] == steps * 500
+
+
+def test_a_table_made_again_says_the_same(study, tmp_path):
+    copy = tmp_path / "copy"
+    for part in ("networks", "results"):
+        shutil.copytree(study / part, copy / part)  # no runs: the networks are enough
+    shutil.copy(study / "plan.json", copy)
+    stages = ("networks", "sets", "methods", "iterations", "curves", "poses", "errors")
+    done = paper("-o", copy, *[word for s in stages for word in ("--stage", s)])
+    assert done.code == 0, done.err
+    for stage in stages:
+        first, again = (without_times(f / "results" / f"{stage}.json") for f in (study, copy))
+        assert first == again, stage
+
+
+def without_times(path: Path):
+    """A result without what may differ: times, and how it was made."""
+
+    def strip(value):
+        if isinstance(value, dict):
+            return {k: strip(v) for k, v in value.items()
+                    if not k.endswith("seconds") and k != "made"}  # fmt: skip
+        return [strip(v) for v in value] if isinstance(value, list) else value
+
+    return strip(json.loads(path.read_text()))
+
+
+def test_a_training_made_again_gives_the_same_bits(study, tmp_path):
+    plan = Plan.load(study / "plan.json")
+    again = Study(Platform.load("reference"), plan, tmp_path)
+    from gough.learn.train import train
+
+    threads = torch.get_num_threads()
+    try:
+        train(again.platform, plan.config("full", "wise-mlp"), tmp_path / "run", show=False)
+    finally:
+        torch.set_num_threads(threads)
+    first, second = (load_tensors(f / "weights.safetensors")[0]
+                     for f in (study / "runs/full/wise-mlp", tmp_path / "run"))  # fmt: skip
+    assert all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_a_study_that_was_stopped_goes_on(study, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(study, copy)
+    (copy / "networks" / "80" / "wise-mlp.onnx").unlink()
+    (copy / "results" / "poses.json").unlink()
+    kept = (copy / "results" / "times.json").read_bytes()
+    assert paper("-o", copy).code == 2  # not by accident
+    done = paper("-o", copy, "--resume")
+    assert done.code == 0, done.err
+    assert (copy / "networks" / "80" / "wise-mlp.onnx").exists()
+    assert (copy / "results" / "poses.json").exists()
+    assert (copy / "results" / "times.json").read_bytes() == kept
+    assert "times: done before" in done.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "holds a study already"),
+        (("--resume", "--budget", "2s"), "is a study of another size"),
+        (("--resume", "-p", "rubin_camera"), "is a study of another platform"),
+        (("--stage", "speed"), "invalid choice"),
+    ],
+)
+def test_mistakes_are_told_in_a_line(study, arguments, words):
+    done = paper("-o", study, *arguments)
+    assert done.code == 2
+    assert words in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_stage_without_networks_says_what_to_run(study, tmp_path):
+    shutil.copy(study / "plan.json", tmp_path)
+    done = paper("-o", tmp_path, "--stage", "sets")
+    assert done.code == 2
+    assert "not trained yet; run: gough paper --stage train" in done.err
+
+
+def test_another_machine_has_a_study_too(tmp_path):
+    """Metres, rotary legs: the experiments are not made for one platform."""
+    done = paper("-o", tmp_path / "s", "-p", "reachy_mini", "--quick", "--budget", "0.2s",
+                 "--stage", "train", "--stage", "methods", "--stage", "iterations")  # fmt: skip
+    assert done.code == 0, done.err
+    rows = json.loads((tmp_path / "s/results/methods.json").read_text())["rows"]
+    solved = {r["name"]: r["count"] - r["singular"] - r["imprecise"] - r["wrong"] for r in rows}
+    assert solved["polynomial-3 + gough.solve"] == 100
+    assert sys.version_info >= (3, 11)
