@@ -65,14 +65,15 @@ def sequential(platform: Platform, seed: Seed) -> Method:
     return Method.of(seed, refine, "CPU-NR")
 
 
-def batched(platform: Platform, seed: Seed, f_max: int = 20) -> Method:
-    """The paper's GPU-friendly method, here on the CPU."""
+def batched(platform: Platform, seed: Seed, f_max: int = F_MAX, scaled: bool = False) -> Method:
+    """The paper's GPU-friendly method, here on the CPU; `scaled` is not the paper's."""
 
     def refine(guess: Pose, legs: Array, gamma: float) -> Refined:
-        end = batched_newton(platform, guess, legs, gamma=gamma, f_max=f_max)
+        end = batched_newton(platform, guess, legs, gamma=gamma, f_max=f_max, scaled=scaled)
         return Refined(end.pose, end.converged, end.singular, end.iterations)
 
-    name = "batched NR" if f_max == F_MAX else f"batched NR, f_max = {f_max}"
+    name = "batched NR" + (" scaled" if scaled else "")
+    name += f", f_max = {f_max}" if f_max != F_MAX else ""
     return Method.of(seed, refine, name, "sweeps")
 
 

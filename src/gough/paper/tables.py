@@ -23,7 +23,7 @@ from gough.paper.published import GAMMAS
 from gough.paper.study import Study
 
 POLYNOMIALS = tuple(f"polynomial-{degree}" for degree in DEGREES)
-OTHER_F_MAX = (5, 10, 15, 40)  # inner iterations that the iteration table tries
+OTHER_F_MAX = (15, 17, 40)  # inner iterations that the iteration table tries
 WIDE_SOLVED = 10  # times W poses for the two-stage methods of the wide workspace
 
 
@@ -67,6 +67,7 @@ def iterations(study: Study) -> dict:
     disgnet = study.network("full", "disgnet")
     chosen = [m for m in two_stage(study) if "gough" not in m.name]  # which knows no gamma
     chosen += [batched(study.platform, disgnet, f_max) for f_max in OTHER_F_MAX]
+    chosen += [batched(study.platform, disgnet, scaled=True)]
     out = []
     for method in chosen:
         ends = [
@@ -90,9 +91,11 @@ def wide(study: Study) -> dict:
     few = WIDE_SOLVED * study.plan.solved
     truth, legs = truth[:few], legs[:few]
     for row in out["same"]:
-        method = batched(machine, _wide_seed(study, row["name"]))
-        end = Outcome.of(machine, method, method.run(legs, GAMMAS[-1]), truth)
-        row["batched"] = asdict(end)
+        seed = _wide_seed(study, row["name"])
+        for key in ("batched", "scaled"):
+            method = batched(machine, seed, scaled=key == "scaled")
+            end = method.run(legs, GAMMAS[-1])
+            row[key] = asdict(Outcome.of(machine, method, end, truth))
     return out
 
 
