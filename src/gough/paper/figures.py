@@ -96,8 +96,9 @@ def solved_poses(study: Study) -> Figure:
     left, turned = solved.distance(truth)
     unit = length_unit(study.platform)
     figure = new_figure(WIDTH, 0.62 * WIDTH)
-    for i, place in enumerate(figure.add_gridspec(2, 4)):
-        axes = pose_axes(figure, study.platform, [truth[i], solved[i]], place)
+    places = figure.add_gridspec(2, 4)
+    for i in range(len(truth)):
+        axes = pose_axes(figure, study.platform, [truth[i], solved[i]], places[divmod(i, 4)])
         draw_pose(axes, study.platform, truth[i], style=TRUTH)
         draw_pose(axes, study.platform, solved[i], style=SOLVED)
         axes.set(xticklabels=[], yticklabels=[], zticklabels=[], xlabel="", ylabel="", zlabel="")

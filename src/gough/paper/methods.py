@@ -91,7 +91,7 @@ def ours(platform: Platform, seed: Seed) -> Method:
 
     def run(legs: Array, gamma: float) -> Refined:
         end = solve(platform, legs, seed=seed)
-        return Refined(end.pose, end.usable, np.zeros(len(legs), bool), end.iterations)
+        return Refined(end.pose, end.usable, np.zeros(len(legs), bool), end.iterations.astype(int))
 
     return Method(f"{seed.name} + gough.solve", run)
 

@@ -87,20 +87,20 @@ def linear_fit(x: list[int], y: list[float]) -> dict:
     from scipy import stats
 
     a, b = np.asarray(x, float), np.asarray(y, float)
-    fit = stats.linregress(a, b)
-    left = b - fit.slope * a - fit.intercept
+    slope, intercept, r, *_ = stats.linregress(a, b)
+    left = b - slope * a - intercept
     freedom = len(a) - 2
     return {
-        "slope": float(fit.slope), "intercept": float(fit.intercept), "mean": float(a.mean()),
+        "slope": float(slope), "intercept": float(intercept), "mean": float(a.mean()),
         "sxx": float(np.sum((a - a.mean()) ** 2)), "count": len(a),
         "deviation": float(np.sqrt(np.sum(left**2) / freedom)),
-        "quantile": float(stats.t.ppf(0.975, freedom)), "r2": float(fit.rvalue**2),
+        "quantile": float(stats.t.ppf(0.975, freedom)), "r2": float(r**2),
     }  # fmt: skip
 
 
 def poses(study: Study) -> dict:
     """Eight test poses, DisGNet's guesses for them, and what the second stage makes of these."""
-    truth, legs = (x[:DRAWN] for x in study.test_set())
+    truth, legs = study.test_set(DRAWN)
     disgnet = study.network("full", "disgnet")
     guess = disgnet.guess(legs)
     end = batched(study.platform, _Guessed(guess)).run(legs, GAMMAS[-1])

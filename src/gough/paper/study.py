@@ -82,9 +82,12 @@ class Study:
             raise GoughError(f"{path}: not trained yet; run: gough paper --stage train")
         return NetworkSeed(machine_of(self.platform, name), path)
 
-    def test_set(self, name: str = "full", same_assembly: bool = False) -> tuple[Pose, Array]:
-        """Held-out poses (test,) and readings (test, 6)."""
-        return held_out(machine_of(self.platform, name), self.plan.test, same_assembly)
+    def test_set(
+        self, first: int | None = None, name: str = "full", same_assembly: bool = False
+    ) -> tuple[Pose, Array]:
+        """The `first` of the held-out poses (test,) and readings (test, 6), or all of them."""
+        truth, legs = held_out(machine_of(self.platform, name), self.plan.test, same_assembly)
+        return truth[:first], legs[:first]
 
     # ---- results ----------------------------------------------------------------------
 

@@ -52,7 +52,7 @@ def sets(study: Study) -> dict:
 def methods(study: Study) -> dict:
     """Table II: average time and success rate of two-stage methods at gamma = 0.0001."""
     gamma = GAMMAS[-1]
-    truth, legs = (x[: study.plan.solved] for x in study.test_set())
+    truth, legs = study.test_set(study.plan.solved)
     out = []
     for method in two_stage(study):
         end = Outcome.of(study.platform, method, method.run(legs, gamma), truth)
@@ -63,7 +63,7 @@ def methods(study: Study) -> dict:
 
 def iterations(study: Study) -> dict:
     """Iterations at the three precision levels, and what the inner iterations change in them."""
-    truth, legs = (x[: study.plan.solved] for x in study.test_set())
+    truth, legs = study.test_set(study.plan.solved)
     disgnet = study.network("full", "disgnet")
     chosen = [m for m in two_stage(study) if "gough" not in m.name]  # which knows no gamma
     chosen += [batched(study.platform, disgnet, f_max) for f_max in OTHER_F_MAX]
@@ -87,9 +87,7 @@ def wide(study: Study) -> dict:
     for key, same in (("same", True), ("all", False)):
         rows = evaluate(machine, names, poses=study.plan.test, same_assembly=same)
         out[key] = [_network_row(name, row) for name, row in zip(_short(), rows, strict=True)]
-    truth, legs = study.test_set("wide", same_assembly=True)
-    few = WIDE_SOLVED * study.plan.solved
-    truth, legs = truth[:few], legs[:few]
+    truth, legs = study.test_set(WIDE_SOLVED * study.plan.solved, "wide", same_assembly=True)
     for row in out["same"]:
         seed = _wide_seed(study, row["name"])
         for key in ("batched", "scaled"):
