@@ -66,7 +66,8 @@ class Refined:
     """What became of each row, as tensors on the device of the computation.
 
     Attributes:
-        position: (N, 3) [unit]; rows that did not converge hold their last pose.
+        position: (N, 3) [unit]; rows that did not converge hold their last pose, those with
+            invalid input NaN.
         rotation: (N, 3, 3).
         outcome: (N,) uint8, to be compared with `Outcome` members.
         iterations: (N,) int64, steps taken.
@@ -260,6 +261,8 @@ class _Rows:
     def end(self, sweeps: int) -> Refined:
         """Where all rows are now."""
         position, rotation = se3.exp(self.xi)
+        invalid = self.outcome == Outcome.INVALID_INPUT
+        position[invalid], rotation[invalid] = torch.nan, torch.nan
         errors, _ = self.platform.strut_errors(position, rotation, self.starts, self.lengths)
         return Refined(
             position, rotation, self.outcome, self.iterations, self.inverse_iterations, self.step,
