@@ -72,7 +72,7 @@ class Refined:
         outcome: (N,) uint8, to be compared with `Outcome` members.
         iterations: (N,) int64, steps taken.
         inverse_iterations: (N,) int64, the most that an inverse took.
-        step: (N,) |xi_new - xi|_1 of the last step, [unit] and [rad] added up.
+        step: (N,) `|xi_new - xi|_1` of the last step, [unit] and [rad] added up.
         residual: (N,) largest strut length error at the end [unit].
         sweeps: passes of the whole batch.
     """
@@ -130,7 +130,7 @@ def batched_newton(
     """Refine guesses, one pose or (N,), for readings (N, 6), all rows at once.
 
     Args:
-        gamma: a row has converged when |xi_new - xi|_1 is below it. As in the paper that adds up
+        gamma: a row has converged when `|xi_new - xi|_1` is below it. As in the paper that adds up
             [unit] and [rad]: for a machine in mm it is mostly about mm.
         f_max: iterations of an inverse.
         z_max: steps of a row.
