@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from math import log
+from unittest.mock import patch
 
 import numpy as np
 import torch
@@ -18,7 +19,7 @@ from torch import Tensor
 
 from gough import Platform, Pose, leg_lengths
 from gough.learn import se3
-from gough.learn.batched_newton import REGULAR
+from gough.learn.batched_newton import REGULAR, batched_newton
 from gough.learn.geometry import TorchPlatform
 from gough.learn.inverse import approximate_inverse, first_inverse, next_inverse
 
@@ -160,6 +161,23 @@ def sweeps(name: str, inverse: Callable[[Tensor], Tensor], count: int = 1000) ->
     print(f"{name:24} {found}")
 
 
+def wild_guesses(count: int = 10_000) -> tuple[float, float]:
+    """Shares of rows that converge from guesses turned by up to half a turn about any axis.
+
+    First as it is; then with rotation vectors left as long as the steps make them.
+    """
+    platform, rng = Platform.load("reference"), np.random.default_rng(0)
+    truth = platform.with_workspace(*WIDE).sample_poses(count, seed=3)
+    axis = rng.standard_normal((count, 3))
+    turn = rng.uniform(0, np.pi, (count, 1)) * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    shift = 100 * rng.standard_normal((count, 3))
+    guess = Pose.from_rotation_vector(truth.position + shift, turn)
+    legs = leg_lengths(platform, truth)
+    kept = batched_newton(platform, guess, legs, f_max=60).converged.mean()
+    with patch.object(se3, "shortest", lambda xi: xi):
+        return float(kept), float(batched_newton(platform, guess, legs, f_max=60).converged.mean())
+
+
 # ---- figure ---------------------------------------------------------------------------
 
 
@@ -218,6 +236,8 @@ def main() -> None:
     sweeps("to rounding", fully)
     sweeps("last with average < 1", last_allowed)
     sweeps("first with average < 1", first_allowed)
+    kept, long = wild_guesses()
+    print(f"\nfrom wild guesses {kept:.1%} converge, {long:.1%} if |w| may grow beyond pi")
 
 
 if __name__ == "__main__":

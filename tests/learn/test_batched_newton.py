@@ -103,6 +103,13 @@ def test_the_way_to_a_pose_at_half_a_turn(seed: int) -> None:
     assert end.iterations.max() <= 6
 
 
+def test_rotation_vectors_are_kept_short() -> None:
+    """At a whole turn V is singular; rows that come near it are lost."""
+    kept, long = inverse_study.wild_guesses(1000)
+    assert kept > 0.85
+    assert long < 0.6
+
+
 def planted() -> tuple[Platform, Pose, np.ndarray, dict[int, Outcome]]:
     """Good rows with one of every bad kind between them."""
     platform = reference()
