@@ -66,12 +66,13 @@ class Refined:
     """What became of each row, as tensors on the device of the computation.
 
     Attributes:
-        position: (N, 3) [unit]; rows that did not converge hold their last pose.
+        position: (N, 3) [unit]; rows that did not converge hold their last pose, those with
+            invalid input NaN.
         rotation: (N, 3, 3).
         outcome: (N,) uint8, to be compared with `Outcome` members.
         iterations: (N,) int64, steps taken.
         inverse_iterations: (N,) int64, the most that an inverse took.
-        step: (N,) |xi_new - xi|_1 of the last step, [unit] and [rad] added up.
+        step: (N,) `|xi_new - xi|_1` of the last step, [unit] and [rad] added up.
         residual: (N,) largest strut length error at the end [unit].
         sweeps: passes of the whole batch.
     """
@@ -129,7 +130,7 @@ def batched_newton(
     """Refine guesses, one pose or (N,), for readings (N, 6), all rows at once.
 
     Args:
-        gamma: a row has converged when |xi_new - xi|_1 is below it. As in the paper that adds up
+        gamma: a row has converged when `|xi_new - xi|_1` is below it. As in the paper that adds up
             [unit] and [rad]: for a machine in mm it is mostly about mm.
         f_max: iterations of an inverse.
         z_max: steps of a row.
@@ -260,6 +261,8 @@ class _Rows:
     def end(self, sweeps: int) -> Refined:
         """Where all rows are now."""
         position, rotation = se3.exp(self.xi)
+        invalid = self.outcome == Outcome.INVALID_INPUT
+        position[invalid], rotation[invalid] = torch.nan, torch.nan
         errors, _ = self.platform.strut_errors(position, rotation, self.starts, self.lengths)
         return Refined(
             position, rotation, self.outcome, self.iterations, self.inverse_iterations, self.step,

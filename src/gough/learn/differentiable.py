@@ -59,7 +59,7 @@ def solve(
         GoughError: tensors of other shapes; what `gough.solve` raises.
         PlatformError: joints that make no platform.
     """
-    facts = _joints(platform, legs, base, moving)
+    facts = _joints("legs", platform, legs, base, moving)
     if legs.shape[-1:] != (6,):
         raise GoughError(f"legs: expected (..., 6), got {tuple(legs.shape)}")
     flat = legs.reshape(-1, 6)
@@ -94,7 +94,7 @@ def leg_lengths(
         base, moving: joints (6, 3) instead of the platform's own; for length changes, lengths at
             home are those of the joints given.
     """
-    return _joints(platform, position, base, moving).legs_at(position, rotation)
+    return _joints("position", platform, position, base, moving).legs_at(position, rotation)
 
 
 class _FromAfar:
@@ -109,11 +109,13 @@ class _FromAfar:
         return self._seed.guess(legs)
 
 
-def _joints(platform: Platform, like: Tensor, base: Tensor | None, moving: Tensor | None
-            ) -> TorchPlatform:  # fmt: skip
+def _joints(name: str, platform: Platform, like: Tensor, base: Tensor | None,
+            moving: Tensor | None) -> TorchPlatform:  # fmt: skip
     """The platform in the dtype and on the device of a tensor, with joints that may be given."""
-    if not like.is_floating_point():
-        raise GoughError(f"expected tensors of floating point, found {like.dtype}")
+    kind = like.dtype if isinstance(like, Tensor) else type(like).__name__
+    if not (isinstance(kind, torch.dtype) and kind.is_floating_point):
+        found = str(kind).removeprefix("torch.")
+        raise GoughError(f"{name}: expected a tensor of floating point, found {found}")
     for name, joints in (("base", base), ("moving", moving)):
         if joints is not None and joints.shape != (6, 3):
             raise GoughError(f"{name}: expected (6, 3), got {tuple(joints.shape)}")

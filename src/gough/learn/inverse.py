@@ -23,7 +23,7 @@ class Inverses:
 
     Attributes:
         Z: (N, n, n).
-        error: (N,) |I - JZ| in the Frobenius norm; NaN for a matrix that holds one.
+        error: (N,) `|I - JZ|` in the Frobenius norm; NaN for a matrix that holds one.
         iterations: (N,) int64.
     """
 
