@@ -19,6 +19,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from gough.checks import Array
 from gough.kinematics import assembly_sign, singularity_distance
+from gough.platform import Platform
 from gough.plot.shapes import Skeleton, outline_order, skeleton
 from gough.plot.style import (
     BLUE,
@@ -35,7 +36,6 @@ from gough.plot.style import (
     shown_readings,
     styled,
 )
-from gough.platform import Platform
 from gough.pose import Pose
 
 STROKE = ("viridis", 0.0, 0.9)  # colour map of the stroke, without its palest part
@@ -70,7 +70,7 @@ class PoseStyle:
 
 SOLVED = PoseStyle()
 # a second pose beside the first: a dashed outline
-GHOST = PoseStyle(plate=VERMILION, line="--", width=1.3, fill=0.0, legs="", base=False,
+GHOST = PoseStyle(plate=INK, line="--", width=1.3, fill=0.0, legs="", base=False,
                   numbers=False)  # fmt: skip
 
 
@@ -114,9 +114,7 @@ def draw_pose(
 
 
 @styled
-def pose_axes(
-    figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111
-) -> Axes3D:
+def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111) -> Axes3D:
     """3-D axes to scale that hold all of `poses`, with units.
 
     Args:
@@ -156,6 +154,7 @@ def pose_figure(
     Raises:
         GoughError: a batch of poses, or a pose of NaN.
     """
+    bones = skeleton(platform, pose)
     figure = new_figure(8.6, 4.9)
     figure.suptitle(title or _title(platform, pose))
     poses = [pose] if ghost is None else [pose, ghost]
@@ -164,7 +163,7 @@ def pose_figure(
     draw_pose(axes, platform, pose)
     if ghost is not None:
         draw_pose(axes, platform, ghost, style=GHOST)
-    _draw_readings(figure.add_subplot(right), platform, skeleton(platform, pose))
+    _draw_readings(figure.add_subplot(right), platform, bones)
     _legend(figure, platform, ghost is not None)
     return figure
 
