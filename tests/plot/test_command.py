@@ -52,12 +52,10 @@ def test_a_pose_in_three_ways_is_one_picture(gough_command, ending):
     numbers = np.array([float(v) for v in SIX])
     legs = gough.leg_lengths(platform, gough.Pose.from_euler(numbers[:3], np.radians(numbers[3:])))
     Path("poses.csv").write_text("x,y,z,rx_deg,ry_deg,rz_deg\n0,0,600,0,0,0\n" + ",".join(SIX))
-    for k, given in enumerate(
-        (SIX, ("--legs", *map(repr, map(float, legs))), ("poses.csv", "--row", 2))
-    ):
-        code, _, err = gough_command(
-            "plot", "pose", *given, "-p", "reference", "-o", f"{k}.{ending}"
-        )
+    as_legs = ("--legs", *map(repr, map(float, legs)))
+    for k, given in enumerate((SIX, as_legs, ("poses.csv", "--row", 2))):
+        out = f"{k}.{ending}"
+        code, _, err = gough_command("plot", "pose", *given, "-p", "reference", "-o", out)
         assert (code, err) == (0, "")
     first, _, third = (Path(f"{k}.{ending}").read_bytes() for k in range(3))
     assert first == third

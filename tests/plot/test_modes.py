@@ -37,7 +37,7 @@ def test_every_mode_is_drawn_where_it_is(name):
 
 def test_readings_without_a_pose_give_a_figure_that_says_so():
     platform = gough.Platform.load("reference")
-    modes = gough.assembly_modes(platform, platform.home_legs + [0, 0, 0, 0, 0, 900])
+    modes = gough.assembly_modes(platform, platform.home_legs + np.array([0, 0, 0, 0, 0, 900]))
     assert len(modes) == 0
     assert "0 poses" in modes_figure(modes).get_suptitle()
 

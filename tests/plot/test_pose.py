@@ -138,7 +138,7 @@ def test_the_scales_beside_show_the_readings(name):
     pose = a_pose(platform)
     figure = pose_figure(platform, pose, ghost=platform.home)
     scales = figure.axes[1]
-    markers = [line for line in scales.get_lines() if line.get_marker() in "oX"]
+    markers = [line for line in scales.get_lines() if line.get_marker() in ("o", "X")]
     shown = [np.asarray(line.get_xdata(), dtype=float)[0] for line in markers]
     expected = shown_readings(platform, gough.leg_lengths(platform, pose))
     np.testing.assert_allclose(shown, expected, rtol=1e-12)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
@@ -46,7 +48,7 @@ def test_an_envelope_is_the_lowest_and_highest_of_equal_runs_of_rows(rows, bins,
     x = np.cumsum(rng.random(rows))
     envelope = Envelope(("a", "b"), bins=bins)
     edges = sorted({0, rows, *(c for c in cuts if c < rows)})
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in pairwise(edges):
         envelope.add(x[start:end], values[start:end], answered[start:end])
     width = envelope.width
     assert width & (width - 1) == 0

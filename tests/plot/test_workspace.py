@@ -85,7 +85,7 @@ def test_the_edge_of_the_stroke_is_drawn_where_a_leg_is_at_its_end():
     thick = [
         c for c in figure.axes[0].collections
         if isinstance(c, QuadContourSet) and list(c.levels) == [0.0]
-        and np.ravel(c.get_linewidths())[0] == 2.0
+        and np.ravel(c.get_linewidth())[0] == 2.0
     ]  # fmt: skip
     assert len(thick) == 1
     assert platform.stroke is not None

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -136,7 +135,7 @@ def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any
         axis.set_tick_params(pad=0)
     unit = length_unit(platform)
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
-    axes.set_box_aspect(half / max(half), zoom=1.08)
+    axes.set_box_aspect(half / max(half), zoom=1.08)  # pyright: ignore[reportArgumentType]
     axes.view_init(*VIEW)
     return axes
 
@@ -178,7 +177,7 @@ def _polygon(
     corners = points[outline_order(points)]
     if fill:
         axes.add_collection3d(
-            Poly3DCollection([corners], facecolors=mpl.colors.to_rgba(color, fill), linewidths=0)
+            Poly3DCollection([corners], facecolors=to_rgba(color, fill), linewidths=0)
         )
     closed = np.concatenate([corners, corners[:1]])
     return axes.plot(*closed.T, line, color=color, linewidth=width, alpha=alpha)[0]
@@ -214,7 +213,8 @@ def _number_legs(axes: Axes3D, base: Array) -> None:
         places.setdefault(key, []).append(str(i + 1))
     for key, names in places.items():
         where = centre + spread * 1.16 * np.array(key)
-        axes.text(*where, ", ".join(names), fontsize=8, color=INK, ha="center", va="center")
+        x, y, z = where
+        axes.text(x, y, z, ", ".join(names), fontsize=8, color=INK, ha="center", va="center")
 
 
 def _draw_readings(axes: Axes, platform: Platform, bones: Skeleton) -> None:

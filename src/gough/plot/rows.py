@@ -166,7 +166,7 @@ def _times(block: Block, column: str | None, before: int) -> Array:
     known = np.isfinite(x)
     if not np.any(known):
         raise InputError(f"{block.place(0)} and on: column {column} holds no numbers")
-    return np.interp(rows, rows[known], x[known])
+    return np.asarray(np.interp(rows, rows[known], x[known]), dtype=np.float64)
 
 
 # ---- parts ----------------------------------------------------------------------------
@@ -194,7 +194,8 @@ def _blocks(
     if time is not None:
         checked(source.where, source.columns, (time,))
     keep = (STATUS,) if STATUS in source.columns and STATUS not in names else ()
-    numbers = tuple(dict.fromkeys([*names, *([time] if time else [])]))
+    more = () if time is None or time in names else (time,)
+    numbers = (*names, *more)
     return source.blocks(numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
 
 

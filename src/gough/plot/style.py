@@ -40,7 +40,7 @@ CURVES: tuple[tuple[str, Any], ...] = (
 ENDINGS = (".svg", ".png", ".pdf")
 DPI = 160
 
-_RC = {
+_RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib, so pictures are the same everywhere
     "font.size": 9,
     "axes.titlesize": 9,
