@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -53,6 +55,17 @@ def test_every_value_is_counted_once_in_its_place(values, pieces):
             assert np.mean(finite <= value * (1 + 1e-9)) >= share
             below = finite <= value * 10 ** (-1.02 / (10 * PER_DECADE))
             assert value == 0 or np.mean(below) < share
+
+
+def test_a_histogram_is_kept_as_json_and_comes_back():
+    values = np.concatenate([np.geomspace(1e-14, 3.0, 200), [0.0, 0.0, np.nan]])
+    histogram = LogHistogram.of(values)
+    again = LogHistogram.from_dict(json.loads(json.dumps(histogram.as_dict())))
+    assert again.as_dict() == histogram.as_dict()
+    np.testing.assert_array_equal(again.shares(-14, 1), histogram.shares(-14, 1))
+    assert again.quantile(0.3) == histogram.quantile(0.3)
+    empty = LogHistogram.from_dict(LogHistogram().as_dict())
+    assert (empty.count, empty.range) == (0, (0, 0))
 
 
 def test_negative_errors_are_refused():

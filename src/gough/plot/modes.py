@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,8 +18,11 @@ from gough.modes.result import AssemblyModes
 from gough.plot.shapes import outline_order
 from gough.plot.style import BLUE, FAINT, GREY, VERMILION, length_unit, new_figure, styled
 
+Look = tuple[str, Literal["-", "--"]]  # colour and line
 LEFT, LEAST, CELL = 4.4, 5.6, 1.3  # [inch] overlays wide, figure tall, one pose wide
-SAME, OTHER, BASE = (BLUE, "-"), (VERMILION, "--"), GREY
+BASE = GREY
+SAME: Look = (BLUE, "-")
+OTHER: Look = (VERMILION, "--")
 
 
 @styled
@@ -123,7 +126,7 @@ def _single(
     axes.plot(*closed.T, color=color, linestyle=line, linewidth=1.3)
 
 
-def _look(sign: float) -> tuple[str, str]:
+def _look(sign: float) -> Look:
     return SAME if sign > 0 else OTHER
 
 

@@ -166,7 +166,7 @@ def _times(block: Block, column: str | None, before: int) -> Array:
     known = np.isfinite(x)
     if not np.any(known):
         raise InputError(f"{block.place(0)} and on: column {column} holds no numbers")
-    return np.asarray(np.interp(rows, rows[known], x[known]), dtype=np.float64)
+    return np.interp(rows, rows[known], x[known]).astype(np.float64)
 
 
 # ---- parts ----------------------------------------------------------------------------
