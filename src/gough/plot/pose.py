@@ -135,7 +135,7 @@ def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any
         axis.set_tick_params(pad=0)
     unit = length_unit(platform)
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
-    axes.set_box_aspect(half / max(half), zoom=1.08)  # pyright: ignore[reportArgumentType]
+    axes.set_box_aspect(half / max(half), zoom=1.2)  # pyright: ignore[reportArgumentType]
     axes.view_init(*VIEW)
     return axes
 
@@ -154,7 +154,7 @@ def pose_figure(
         GoughError: a batch of poses, or a pose of NaN.
     """
     bones = skeleton(platform, pose)
-    figure = new_figure(8.6, 4.9)
+    figure = new_figure(8.0, 4.5)
     figure.suptitle(title or _title(platform, pose))
     poses = [pose] if ghost is None else [pose, ghost]
     left, right = figure.add_gridspec(1, 2, width_ratios=[1.7, 1])
@@ -271,8 +271,8 @@ def _legend(figure: Figure, platform: Platform, ghost: bool) -> None:
 
 
 def _title(platform: Platform, pose: Pose) -> str:
-    lengths = ", ".join(number(v, platform.size) for v in pose.position)
-    angles = ", ".join(number(v, 100) for v in np.degrees(pose.euler))
+    lengths = ", ".join(number(v, platform.size / 10) for v in pose.position)
+    angles = ", ".join(number(v, 10) for v in np.degrees(pose.euler))
     where = f"({lengths}) {platform.unit}".rstrip() + f", ({angles}) deg"
     away = float(singularity_distance(platform, pose))
     if np.isnan(away):

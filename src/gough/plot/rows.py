@@ -161,12 +161,12 @@ def _times(block: Block, column: str | None, before: int) -> Array:
     """The horizontal axis (n,): a column, its gaps bridged, or the number of the row."""
     rows = np.arange(len(block))
     if column is None:
-        return before + 1.0 + rows
+        return (before + 1 + rows).astype(np.float64)
     x = block.numbers([column])[:, 0]
     known = np.isfinite(x)
     if not np.any(known):
         raise InputError(f"{block.place(0)} and on: column {column} holds no numbers")
-    return np.interp(rows, rows[known], x[known]).astype(np.float64)
+    return np.interp(rows, rows[known], x[known])
 
 
 # ---- parts ----------------------------------------------------------------------------
