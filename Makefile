@@ -1,6 +1,6 @@
 # make solve   install the light core into .venv, solve a real machine's leg lengths
 # make test    install what the tests need as well, run them
-# make pictures  the documents' pictures, by the commands beside them
+# make pictures   the documents' pictures, by the commands that stand beside them
 # make lint    ruff, pyright, layers    make docs    HTML into docs/_build    make bench    the tables
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.14 python3.13 python3.12 python3.11,\

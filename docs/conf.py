@@ -24,14 +24,8 @@ autodoc_preserve_defaults = True
 autodoc_mock_imports = [
     name
     for name in (
-        "torch",
-        "roma",
-        "onnx",
-        "onnxscript",
-        "safetensors",
-        "matplotlib",
-        "mpl_toolkits",
-        "viser",
+        *("torch", "roma", "onnx", "onnxscript", "safetensors"),
+        *("matplotlib", "mpl_toolkits", "viser"),
     )
     if find_spec(name) is None
 ]

