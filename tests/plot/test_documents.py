@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("matplotlib")
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-
 import pictures
 
+ROOT = Path(__file__).parents[2]
 LARGEST = 300_000  # bytes of a picture in the documents
 
 
