@@ -262,14 +262,11 @@ def _pose(
 
 def _machine(platform: str, out: str | None, figure: str) -> Platform:
     """The platform; that the picture can be written is checked before any work is done."""
-    from gough.files.replace import check_target
     from gough.platform import Platform
-    from gough.plot.style import check_ending
+    from gough.plot.style import check_picture
 
     machine = Platform.load(platform)
-    path = _target(machine, out, figure)
-    check_ending(path)
-    check_target(path)
+    check_picture(_target(machine, out, figure))
     return machine
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gough.checks import Array
 
-BINS = 1500  # a page is not finer
+BINS = 600  # at least; a page is hardly finer
 
 
 class Envelope:
