@@ -46,7 +46,9 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, ending):
 
 
 def test_another_process_and_another_matplotlibrc_give_the_same_bytes_without_pyplot(tmp_path):
-    (tmp_path / "matplotlibrc").write_text("font.size: 20\nsvg.hashsalt: other\naxes.grid: True\n")
+    (tmp_path / "matplotlibrc").write_text(
+        "font.size: 20\nsvg.hashsalt: other\naxes.facecolor: red\n"
+    )
     plain = {k: v for k, v in os.environ.items() if k != "MATPLOTLIBRC"}
     for name, environment in (
         ("a.svg", plain | {"PYTHONHASHSEED": "1"}),
