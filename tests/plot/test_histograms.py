@@ -33,7 +33,7 @@ def count_of(histogram: LogHistogram, first: int, last: int) -> int:
 
 
 @given(
-    st.lists(st.floats(0, 1e300) | st.floats(1e-12, 1e3) | st.sampled_from([0.0, np.nan, np.inf]),
+    st.lists(st.floats(1e-300, 1e300) | st.floats(1e-12, 1e3) | st.sampled_from([0.0, np.nan, np.inf]),
              min_size=1, max_size=200),
     st.integers(1, 7),
 )  # fmt: skip
@@ -53,7 +53,7 @@ def test_every_value_is_counted_once_in_its_place(values, pieces):
         for share in (0.01, 0.5, 0.99, 1.0):
             value = histogram.quantile(share)
             assert np.mean(finite <= value * (1 + 1e-9)) >= share
-            below = finite <= value * 10 ** (-1.02 / (10 * PER_DECADE))
+            below = finite <= value * 10 ** (-1.1 / (10 * PER_DECADE))
             assert value == 0 or np.mean(below) < share
 
 
