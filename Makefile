@@ -1,5 +1,6 @@
 # make solve   install the light core into .venv, solve a real machine's leg lengths
 # make test    install what the tests need as well, run them
+# make pictures   the documents' pictures, by the commands that stand beside them
 # make lint    ruff, pyright, layers    make docs    HTML into docs/_build    make bench    the tables
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.14 python3.13 python3.12 python3.11,\
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --disable-pip-version-check --quiet
 
-.PHONY: solve test lint docs bench clean
+.PHONY: solve test lint docs pictures bench clean
 
 solve: $(VENV)/.core
 	$(BIN)/gough solve examples/rubin_camera_legs.csv -p rubin_camera
@@ -25,6 +26,9 @@ lint: $(VENV)/.dev
 docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
+
+pictures: $(VENV)/.dev
+	$(BIN)/python tools/pictures.py
 
 bench: $(VENV)/.dev
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done

@@ -23,7 +23,10 @@ autodoc_preserve_defaults = True
 # a page may describe a part of the library whose own libraries are not installed here
 autodoc_mock_imports = [
     name
-    for name in ("torch", "roma", "onnx", "onnxscript", "safetensors", "matplotlib", "viser")
+    for name in (
+        *("torch", "roma", "onnx", "onnxscript", "safetensors"),
+        *("matplotlib", "mpl_toolkits", "viser"),
+    )
     if find_spec(name) is None
 ]
 napoleon_google_docstring = True

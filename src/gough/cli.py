@@ -52,11 +52,12 @@ def _guarded(arguments: list[str]) -> int:
         where = f"{error.filename}: " if error.filename else ""
         return _complain(f"{name}: error: {where}{error.strerror or error}")
     except ModuleNotFoundError as error:
-        extra = EXTRAS.get((error.name or "").partition(".")[0])
+        package = (error.name or "").partition(".")[0]
+        extra = EXTRAS.get(package)
         if extra is None:
             raise
         return _complain(
-            f"{name}: error: needs {error.name}, which is not installed; install it with: "
+            f"{name}: error: needs {package}, which is not installed; install it with: "
             f"pip install 'gough[{extra}]', or in a clone: pip install -e '.[{extra}]'"
         )
     except Exception:

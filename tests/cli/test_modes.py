@@ -51,3 +51,28 @@ def test_bad_legs_are_explained(legs):
 def test_invalid_readings_give_exit_code_1(capsys):
     assert run(("nan", "1", "1", "1", "1", "1"), platform="reference") == 1
     assert "correct the row" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("name", gough.Platform.catalog())
+def test_the_table_fits_80_columns(capsys, monkeypatch, name):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run((), platform=name) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[0].split() == [*["pose", "x", "y", "z"], "rx_deg", "ry_deg", "rz_deg", "proven",
+                                "fails"]  # fmt: skip
+    assert "\N{HORIZONTAL ELLIPSIS}" not in "".join(lines)
+
+
+def test_the_file_goes_to_standard_output_and_the_table_beside_it(capfdbinary):
+    assert run((), platform="reference", out="-") == 0
+    out, err = capfdbinary.readouterr()
+    assert out.splitlines()[0].startswith(b"row,pose,x,y,z,qw,qx,qy,qz,status,residual,")
+    assert b"real poses" in err
+
+
+def test_bad_files_name_the_line(tmp_path):
+    path = tmp_path / "legs.csv"
+    path.write_text("leg_1,leg_2,leg_3,leg_4,leg_5,leg_6\n1,2,3,4,5,six\n")
+    with pytest.raises(gough.InputError, match="line 2: column leg_6: found 'six'"):
+        run((str(path),), platform="reference")

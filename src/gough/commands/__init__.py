@@ -2,7 +2,8 @@
 
 To add a command, write a function whose parameters are the options (the docstring's Args become
 the help texts) and which returns the exit code, and put a line into COMMANDS; a dict of such
-functions makes a family, as in `gough plot pose`. A command stands in `gough/commands/NAME.py`, or in the room whose work it starts.
+functions makes a family, as in `gough plot pose`. A command stands in `gough/commands/NAME.py`, or
+in the room whose work it starts.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ COMMANDS = {
     "solve": ("gough.commands.solve", "run", "poses from a file of leg readings"),
     "inverse": ("gough.commands.inverse", "run", "leg readings from a file of poses"),
     "modes": ("gough.commands.modes", "run", "every pose that leg readings allow, each proven"),
-    "plot": ("gough.commands.plot", "FIGURES", "figures: pose, modes, workspace, trajectory, errors"),
+    "plot": ("gough.commands.plot", "FIGURES", "figures of poses, modes, workspaces and files"),
     "platforms": (
         "gough.commands.platforms", "run", "the machines that come with gough, as TOML to edit",
     ),

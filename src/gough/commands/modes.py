@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
@@ -49,17 +50,24 @@ def run(
     from gough.platform import Platform
 
     machine = Platform.load(platform)
+    draw = None if plot is None else _painter(plot)
     modes = assembly_modes(machine, readings(legs, machine), threads=threads)
     choice = choose_mode(modes)
     _print(modes, choice, show.console_beside(out))
     if out is not None:
         _write(out, modes, choice)
-    if plot is not None:
-        from gough.plot.modes import modes_figure
-        from gough.plot.style import save
-
-        save(modes_figure(modes if modes.legs.ndim == 1 else modes[0]), plot)
+    if draw is not None:
+        draw(modes if modes.legs.ndim == 1 else modes[0])
     return 0 if modes.complete.all() else 1
+
+
+def _painter(path: str) -> Callable[[AssemblyModes], None]:
+    """What draws modes; whatever is wrong with the name is said before any work is done."""
+    from gough.plot.modes import modes_figure
+    from gough.plot.style import check_picture, save
+
+    check_picture(path)
+    return lambda modes: save(modes_figure(modes), path)
 
 
 def readings(legs: tuple[str, ...], platform: Platform) -> Array:

@@ -144,7 +144,7 @@ def trajectory(
 
     gough plot trajectory legs.csv -p rubin_camera --time time
 
-    Rows without an answer are marked.
+    Rows without a usable answer are marked.
 
     Of a long file, a band from the lowest to the highest of many rows is drawn.
 
@@ -178,6 +178,7 @@ def errors(
     *,
     platform: PlatformName,
     truth: Annotated[str | None, arg(metavar="POSES", help_behavior_hint="")] = None,
+    all_rows: Annotated[bool, arg(help_behavior_hint="")] = False,
     out: Picture = None,
     keep_bad_rows: KeepBadRows = False,
     ignore_platform: IgnorePlatform = False,
@@ -192,6 +193,7 @@ def errors(
     Args:
         files: .csv or .parquet as gough solve writes them, one or several to compare.
         truth: the true poses, row for row, to compare the files' poses with.
+        all_rows: count rows whose status is not usable, too, such as first guesses.
     """
     from gough.commands.options import reading_options
     from gough.errors import InputError
@@ -212,7 +214,7 @@ def errors(
     panels: dict[str, dict[str, Any]] = {}
     for file in files:
         with _ticking() as tick:
-            found = read_errors(file, machine, truth, reading=reading, tick=tick)
+            found = read_errors(file, machine, truth, all_rows=all_rows, reading=reading, tick=tick)
         for quantity, histogram in found.items():
             panels.setdefault(labels[quantity], {})[file] = histogram
     return _save(histogram_figure(panels, title=machine.name), machine, out, "errors")
@@ -260,14 +262,11 @@ def _pose(
 
 def _machine(platform: str, out: str | None, figure: str) -> Platform:
     """The platform; that the picture can be written is checked before any work is done."""
-    from gough.files.replace import check_target
     from gough.platform import Platform
-    from gough.plot.style import check_ending
+    from gough.plot.style import check_picture
 
     machine = Platform.load(platform)
-    path = _target(machine, out, figure)
-    check_ending(path)
-    check_target(path)
+    check_picture(_target(machine, out, figure))
     return machine
 
 

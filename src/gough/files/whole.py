@@ -33,9 +33,7 @@ def read_legs(path: str | Path, platform: Platform) -> Array:
         return np.concatenate([block.numbers(LEGS) for block in blocks])
 
 
-def write_table(
-    path: str | Path, columns: Mapping[str, pa.Array], platform: Platform
-) -> None:
+def write_table(path: str | Path, columns: Mapping[str, pa.Array], platform: Platform) -> None:
     """Write columns to a .csv or .parquet file, or to standard output for "-".
 
     Raises:

@@ -87,7 +87,8 @@ def linear_fit(x: list[int], y: list[float]) -> dict:
     from scipy import stats
 
     a, b = np.asarray(x, float), np.asarray(y, float)
-    slope, intercept, r, *_ = stats.linregress(a, b)
+    fit: Any = stats.linregress(a, b)  # its type has no fields
+    slope, intercept, r = fit.slope, fit.intercept, fit.rvalue
     left = b - slope * a - intercept
     freedom = len(a) - 2
     return {

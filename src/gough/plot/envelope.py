@@ -6,7 +6,7 @@ import numpy as np
 
 from gough.checks import Array
 
-BINS = 1500  # a page is not finer
+BINS = 600  # at least; a page is hardly finer
 
 
 class Envelope:
@@ -19,7 +19,7 @@ class Envelope:
         names: of the signals.
         width: rows in a bin.
         rows: rows seen.
-        unanswered: rows of them that have no answer.
+        unanswered: rows of them that have no usable answer.
     """
 
     def __init__(self, names: tuple[str, ...], bins: int = BINS) -> None:
@@ -31,9 +31,10 @@ class Envelope:
         self._waiting = self._bins, self._missing
 
     def add(self, x: Array, values: Array, answered: np.ndarray) -> None:
-        """More rows: x (n,), values (n, K), which (n,) of the rows have an answer."""
+        """More rows: x (n,), values (n, K), NaN where there is none, and which (n,) of the
+        rows have a usable answer.
+        """
         gone = ~answered
-        values = np.where(answered[:, None], values, np.nan)
         rows = np.concatenate([x[:, None], x[:, None], values, values], axis=1)
         self.rows += len(x)
         self.unanswered += int(gone.sum())
@@ -92,5 +93,5 @@ class Envelope:
 
     @property
     def missing(self) -> np.ndarray:
-        """(B,) rows without an answer in each bin."""
+        """(B,) rows without a usable answer in each bin."""
         return self._table()[1]

@@ -13,12 +13,14 @@ from gough.checks import Array
 from gough.errors import GoughError
 from gough.plot.style import CURVES, GREY, new_figure, styled
 
-PER_DECADE = 5
-LOWEST, HIGHEST = -320, 310  # decades that float64 has
+PER_DECADE = 5  # bars in a picture
+FINER = 10  # bins behind each bar, from which quantiles are read
+LOWEST, HIGHEST = -324, 309  # decades that float64 has
+_FINE = PER_DECADE * FINER
 
 
 class LogHistogram:
-    """How many values fall into each fifth of a decade; any number of them, in little memory.
+    """How many values fall into each fiftieth of a decade; any number of them, in little memory.
 
     Attributes:
         count: finite values seen.
@@ -29,7 +31,7 @@ class LogHistogram:
 
     def __init__(self) -> None:
         self.count, self.zeros, self.left_out, self.largest = 0, 0, 0, 0.0
-        self._bins = np.zeros((HIGHEST - LOWEST) * PER_DECADE, dtype=np.int64)
+        self._bins = np.zeros((HIGHEST - LOWEST) * _FINE, dtype=np.int64)
 
     @classmethod
     def of(cls, values: Array) -> LogHistogram:
@@ -50,7 +52,7 @@ class LogHistogram:
         self.largest = max(self.largest, float(finite.max()))
         above = finite[finite > 0]
         self.zeros += len(finite) - len(above)
-        places = np.floor((np.log10(above) - LOWEST) * PER_DECADE).astype(np.int64)
+        places = np.floor((np.log10(above) - LOWEST) * _FINE).astype(np.int64)
         self._bins += np.bincount(np.clip(places, 0, len(self._bins) - 1),
                                   minlength=len(self._bins))  # fmt: skip
 
@@ -65,11 +67,13 @@ class LogHistogram:
 
     @classmethod
     def from_dict(cls, facts: dict) -> LogHistogram:
-        """The histogram that `as_dict` told of."""
+        """The histogram that `as_dict` told of, or one with coarser bins that divide ours."""
         histogram = cls()
         histogram.count, histogram.zeros = facts["count"], facts["zeros"]
         histogram.left_out, histogram.largest = facts["left_out"], facts["largest"]
-        histogram._bins[_bins(facts["first"], facts["last"])] = facts["bins"]
+        part = histogram._bins[_bins(facts["first"], facts["last"])]
+        if len(part):
+            part.reshape(len(facts["bins"]), -1)[:, -1] = facts["bins"]
         return histogram
 
     @property
@@ -78,11 +82,12 @@ class LogHistogram:
         found = np.flatnonzero(self._bins)
         if not len(found):
             return 0, 0
-        return (int(found[0] // PER_DECADE) + LOWEST, int(found[-1] // PER_DECADE) + LOWEST + 1)
+        return int(found[0] // _FINE) + LOWEST, int(found[-1] // _FINE) + LOWEST + 1
 
     def shares(self, first: int, last: int) -> Array:
-        """Share of all values in each bin of the decades [first, last)."""
-        return self._bins[_bins(first, last)] / max(self.count, 1)
+        """Share of all values in each fifth of the decades [first, last)."""
+        fine = self._bins[_bins(first, last)]
+        return fine.reshape(-1, FINER).sum(axis=1) / max(self.count, 1)
 
     def quantile(self, share: float) -> float:
         """A value that at least `share` of all do not exceed: the upper edge of its bin."""
@@ -90,7 +95,7 @@ class LogHistogram:
         if wanted <= 0:
             return 0.0
         place = int(np.searchsorted(np.cumsum(self._bins), wanted))
-        return min(10.0 ** ((place + 1) / PER_DECADE + LOWEST), self.largest)
+        return min(10.0 ** ((place + 1) / _FINE + LOWEST), self.largest)
 
 
 @styled
@@ -145,7 +150,7 @@ def draw_histogram(axes: Axes, series: Mapping[str, LogHistogram], label: str) -
 
 def _bins(first: int, last: int) -> slice:
     """Where the bins of the decades [first, last) stand."""
-    return slice((first - LOWEST) * PER_DECADE, (last - LOWEST) * PER_DECADE)
+    return slice((first - LOWEST) * _FINE, (last - LOWEST) * _FINE)
 
 
 def _decades(axes: Axes, first: int, last: int, zero: float | None) -> None:
@@ -172,7 +177,7 @@ def _legend(name: str, histogram: LogHistogram) -> str:
         return f"{name}: no value"
     middle, tail = histogram.quantile(0.5), histogram.quantile(0.99)
     text = (
-        f"{name}: {histogram.count:,} rows, half below {middle:.1g}, 99 % below {tail:.1g}, "
+        f"{name}: {histogram.count:,} rows, half below {middle:.2g}, 99 % below {tail:.2g}, "
         f"largest {histogram.largest:.2g}"
     )
     return text + (f"; {histogram.left_out:,} left out" if histogram.left_out else "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,8 +18,11 @@ from gough.modes.result import AssemblyModes
 from gough.plot.shapes import outline_order
 from gough.plot.style import BLUE, FAINT, GREY, VERMILION, length_unit, new_figure, styled
 
-LEFT, LEAST, CELL = 4.4, 5.6, 1.3  # [inch] overlays wide, figure tall, one pose wide
-SAME, OTHER, BASE = (BLUE, "-"), (VERMILION, "--"), GREY
+Look = tuple[str, Literal["-", "--"]]  # colour and line
+LEFT, LEAST, CELL = 3.6, 5.6, 1.02  # [inch] overlays wide, figure tall, one pose wide
+BASE = GREY
+SAME: Look = (BLUE, "-")
+OTHER: Look = (VERMILION, "--")
 
 
 @styled
@@ -39,15 +42,16 @@ def modes_figure(modes: AssemblyModes) -> Figure:
     rows = max(1, math.ceil(count / columns))
     base = equivalent_struts(modes.platform, modes.legs)[0]
     joints = joint_positions(modes.platform, modes.pose)
-    low, high = _frame(_oblique(np.concatenate([base[None], joints])))
+    low, high = _frames(_oblique(base), _oblique(joints))
+    span = (high - low).max(axis=0, initial=1e-9)
     wide = CELL * columns
-    tall = (CELL * (high[1] - low[1]) / (high[0] - low[0]) + 0.16) * rows + 0.7
+    tall = (CELL * span[1] / span[0] + 0.16) * rows + 0.7
     figure = new_figure(LEFT + wide, min(max(LEAST, tall), 2 * (LEFT + wide)))
     parts: Any = figure.subfigures(1, 2, width_ratios=[LEFT, wide])
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)  # pyright: ignore[reportOptionalMemberAccess, reportCallIssue]
     _draw_together(parts[0], modes, base, joints)
     order = np.argsort(choose_mode(modes).rank)
-    _draw_apart(parts[1], base, joints[order], modes.sign[order], (rows, columns), (low, high))
+    _draw_apart(parts[1], base, joints[order], modes.sign[order], (rows, columns))
     certified = int(modes.certified.sum())
     plural = "" if count == 1 else "s"
     figure.suptitle(
@@ -79,28 +83,28 @@ def _draw_together(figure: Any, modes: AssemblyModes, base: Array, joints: Array
 
 
 def _draw_apart(
-    figure: Any, base: Array, joints: Array, sign: Array, shape: tuple[int, int],
-    frame: tuple[Array, Array],
+    figure: Any, base: Array, joints: Array, sign: Array, shape: tuple[int, int]
 ) -> None:
     """Each pose by itself, all to one scale, seen from the front, right and above."""
     plates, ground = _oblique(joints), _oblique(base)
-    low, high = frame
+    low, high = _frames(ground, plates)
+    middle, half = (low + high) / 2, 0.53 * (high - low).max(axis=0, initial=1e-9)
     panels = np.atleast_1d(figure.subplots(*shape)).ravel()
     for k, axes in enumerate(panels):
         axes.set_axis_off()
         if k < len(plates):
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+            (left, bottom), (right, top) = middle[k] - half, middle[k] + half
+            axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
             _single(axes, ground, plates[k], base, joints[k], float(sign[k]))
             axes.text(0.02, 0.99, f"{k + 1}", fontsize=8, va="top", transform=axes.transAxes)
     figure.suptitle("each by itself, all to one scale", fontsize=9)
 
 
-def _frame(points: Array) -> tuple[Array, Array]:
-    """Lowest and highest corner (2,) of a frame around points (..., 2)."""
-    flat = points.reshape(-1, 2)
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    margin = 0.05 * (high - low).max()
-    return low - margin, high + margin
+def _frames(ground: Array, plates: Array) -> tuple[Array, Array]:
+    """Lowest and highest corner (M, 2) of base and plate, for each of M poses."""
+    below = np.minimum(ground.min(axis=0), plates.min(axis=1))
+    above = np.maximum(ground.max(axis=0), plates.max(axis=1))
+    return below, above
 
 
 def _single(
@@ -119,7 +123,7 @@ def _single(
     axes.plot(*closed.T, color=color, linestyle=line, linewidth=1.3)
 
 
-def _look(sign: float) -> tuple[str, str]:
+def _look(sign: float) -> Look:
     return SAME if sign > 0 else OTHER
 
 

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -19,6 +18,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from gough.checks import Array
 from gough.kinematics import assembly_sign, singularity_distance
+from gough.platform import Platform
 from gough.plot.shapes import Skeleton, outline_order, skeleton
 from gough.plot.style import (
     BLUE,
@@ -35,7 +35,6 @@ from gough.plot.style import (
     shown_readings,
     styled,
 )
-from gough.platform import Platform
 from gough.pose import Pose
 
 STROKE = ("viridis", 0.0, 0.9)  # colour map of the stroke, without its palest part
@@ -70,7 +69,7 @@ class PoseStyle:
 
 SOLVED = PoseStyle()
 # a second pose beside the first: a dashed outline
-GHOST = PoseStyle(plate=VERMILION, line="--", width=1.3, fill=0.0, legs="", base=False,
+GHOST = PoseStyle(plate=INK, line="--", width=1.3, fill=0.0, legs="", base=False,
                   numbers=False)  # fmt: skip
 
 
@@ -114,9 +113,7 @@ def draw_pose(
 
 
 @styled
-def pose_axes(
-    figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111
-) -> Axes3D:
+def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111) -> Axes3D:
     """3-D axes to scale that hold all of `poses`, with units.
 
     Args:
@@ -138,7 +135,7 @@ def pose_axes(
         axis.set_tick_params(pad=0)
     unit = length_unit(platform)
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
-    axes.set_box_aspect(half / max(half), zoom=1.08)
+    axes.set_box_aspect(half / max(half), zoom=1.2)  # pyright: ignore[reportArgumentType]
     axes.view_init(*VIEW)
     return axes
 
@@ -156,7 +153,8 @@ def pose_figure(
     Raises:
         GoughError: a batch of poses, or a pose of NaN.
     """
-    figure = new_figure(8.6, 4.9)
+    bones = skeleton(platform, pose)
+    figure = new_figure(8.0, 4.5)
     figure.suptitle(title or _title(platform, pose))
     poses = [pose] if ghost is None else [pose, ghost]
     left, right = figure.add_gridspec(1, 2, width_ratios=[1.7, 1])
@@ -164,7 +162,7 @@ def pose_figure(
     draw_pose(axes, platform, pose)
     if ghost is not None:
         draw_pose(axes, platform, ghost, style=GHOST)
-    _draw_readings(figure.add_subplot(right), platform, skeleton(platform, pose))
+    _draw_readings(figure.add_subplot(right), platform, bones)
     _legend(figure, platform, ghost is not None)
     return figure
 
@@ -179,7 +177,7 @@ def _polygon(
     corners = points[outline_order(points)]
     if fill:
         axes.add_collection3d(
-            Poly3DCollection([corners], facecolors=mpl.colors.to_rgba(color, fill), linewidths=0)
+            Poly3DCollection([corners], facecolors=to_rgba(color, fill), linewidths=0)
         )
     closed = np.concatenate([corners, corners[:1]])
     return axes.plot(*closed.T, line, color=color, linewidth=width, alpha=alpha)[0]
@@ -215,7 +213,8 @@ def _number_legs(axes: Axes3D, base: Array) -> None:
         places.setdefault(key, []).append(str(i + 1))
     for key, names in places.items():
         where = centre + spread * 1.16 * np.array(key)
-        axes.text(*where, ", ".join(names), fontsize=8, color=INK, ha="center", va="center")
+        x, y, z = where
+        axes.text(x, y, z, ", ".join(names), fontsize=8, color=INK, ha="center", va="center")
 
 
 def _draw_readings(axes: Axes, platform: Platform, bones: Skeleton) -> None:
@@ -272,8 +271,8 @@ def _legend(figure: Figure, platform: Platform, ghost: bool) -> None:
 
 
 def _title(platform: Platform, pose: Pose) -> str:
-    lengths = ", ".join(number(v, platform.size) for v in pose.position)
-    angles = ", ".join(number(v, 100) for v in np.degrees(pose.euler))
+    lengths = ", ".join(number(v, platform.size / 10) for v in pose.position)
+    angles = ", ".join(number(v, 10) for v in np.degrees(pose.euler))
     where = f"({lengths}) {platform.unit}".rstrip() + f", ({angles}) deg"
     away = float(singularity_distance(platform, pose))
     if np.isnan(away):

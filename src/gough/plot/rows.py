@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +58,8 @@ def read_trajectory(
         names, poses = _pose_or_legs(source)
         for block in _blocks(source, platform, names, reading, time):
             if poses:
-                pose, answered = _poses(block, names)
+                pose, _ = poses_from_columns(block.numbers(names), names)
+                answered = _usable(block) & np.isfinite(pose.position[:, 0])
                 with np.errstate(invalid="ignore"):
                     legs = leg_lengths(platform, pose)
                 answered &= np.all(np.isfinite(legs), axis=-1)
@@ -66,11 +67,9 @@ def read_trajectory(
                 legs = block.numbers(LEGS)
                 solution = solve(platform, legs, seed=seed)
                 pose, answered = solution.pose, solution.usable
-            x = envelope.rows + 1.0 + np.arange(len(block))
-            if time is not None:
-                x = block.numbers([time])[:, 0]
-                answered = answered & np.isfinite(x)
-            envelope.add(x, signals(platform, legs, pose.position, pose.euler), answered)
+            values = signals(platform, legs, pose.position, pose.euler)
+            values[~answered, 0 if poses else 6 :] = np.nan  # readings that were read are known
+            envelope.add(_times(block, time, envelope.rows), values, answered)
             if tick:
                 tick(source)
     return envelope
@@ -81,6 +80,7 @@ def read_errors(
     platform: Platform,
     truth: str | Path | None = None,
     *,
+    all_rows: bool = False,
     reading: Reading = Reading(),  # noqa: B008 - frozen
     tick: Tick | None = None,
 ) -> dict[str, LogHistogram]:
@@ -91,6 +91,7 @@ def read_errors(
     Args:
         path: poses, as `gough solve` writes them.
         truth: the true poses, row for row.
+        all_rows: take rows whatever their status, such as first guesses.
 
     Returns:
         "residual" [platform unit] where the file has that column; "shift" [platform unit] and
@@ -100,7 +101,8 @@ def read_errors(
         GoughError, InputError: what is wrong; the files' rows do not match; neither a column of
             residuals nor a truth.
     """
-    with closing(open_source(path)) as source:
+    with ExitStack() as stack:
+        source = stack.enter_context(closing(open_source(path)))
         residual = (RESIDUAL,) if RESIDUAL in source.columns else ()
         if truth is None and not residual:
             raise InputError(
@@ -109,17 +111,18 @@ def read_errors(
             )
         names = pose_columns(source.where, source.columns) if truth is not None else ()
         found = {name: LogHistogram() for name in residual}
-        found |= {} if truth is None else {"shift": LogHistogram(), "turn": LogHistogram()}
-        true = None if truth is None else _Feed(truth, platform, reading)
+        true = None
+        if truth is not None:
+            true = _Feed(stack.enter_context(closing(open_source(truth))), platform, reading)
+            found |= {"shift": LogHistogram(), "turn": LogHistogram()}
         for block in _blocks(source, platform, (*names, *residual), reading, None):
-            answered = _usable(block)
+            answered = _usable(block) | all_rows
             if residual:
                 values = block.numbers(residual)[:, 0]
                 found[RESIDUAL].add(np.where(answered, values, np.nan))
             if true is not None:
-                pose, finite = _poses(block, names)
+                pose, _ = poses_from_columns(block.numbers(names), names)
                 shift, turn = pose.distance(true.take(len(block), source.where))
-                answered &= finite
                 found["shift"].add(np.where(answered, shift, np.nan))
                 found["turn"].add(np.where(answered, np.degrees(turn), np.nan))
             if tick:
@@ -154,6 +157,18 @@ def read_pose(path: str | Path, platform: Platform, row: int, seed: str = "auto"
     raise InputError(f"{path}: there is no row {row}: rows are 1 to {seen}")
 
 
+def _times(block: Block, column: str | None, before: int) -> Array:
+    """The horizontal axis (n,): a column, its gaps bridged, or the number of the row."""
+    rows = np.arange(len(block))
+    if column is None:
+        return (before + 1 + rows).astype(np.float64)
+    x = block.numbers([column])[:, 0]
+    known = np.isfinite(x)
+    if not np.any(known):
+        raise InputError(f"{block.place(0)} and on: column {column} holds no numbers")
+    return np.interp(rows, rows[known], x[known])
+
+
 # ---- parts ----------------------------------------------------------------------------
 
 
@@ -179,14 +194,9 @@ def _blocks(
     if time is not None:
         checked(source.where, source.columns, (time,))
     keep = (STATUS,) if STATUS in source.columns and STATUS not in names else ()
-    numbers = tuple(dict.fromkeys([*names, *([time] if time else [])]))
+    more = () if time is None or time in names else (time,)
+    numbers = (*names, *more)
     return source.blocks(numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
-
-
-def _poses(block: Block, names: Sequence[str]) -> tuple[Pose, NDArray[np.bool_]]:
-    """Poses (n,) of a block, and which of them are answers."""
-    pose, _ = poses_from_columns(block.numbers(names), names)
-    return pose, _usable(block) & np.isfinite(pose.position[:, 0])
 
 
 def _usable(block: Block) -> NDArray[np.bool_]:
@@ -200,10 +210,10 @@ def _usable(block: Block) -> NDArray[np.bool_]:
 class _Feed:
     """Poses of a file, as many at a time as are asked for."""
 
-    def __init__(self, path: str | Path, platform: Platform, reading: Reading) -> None:
-        self._source = open_source(path)
-        self._names = pose_columns(self._source.where, self._source.columns)
-        self._blocks = _blocks(self._source, platform, self._names, reading, None)
+    def __init__(self, source: Source, platform: Platform, reading: Reading) -> None:
+        self._where = source.where
+        self._names = pose_columns(source.where, source.columns)
+        self._blocks = _blocks(source, platform, self._names, reading, None)
         self._values: Array = np.empty((0, len(self._names)))
 
     def take(self, count: int, beside: str) -> Pose:
@@ -212,8 +222,7 @@ class _Feed:
             block = next(self._blocks, None)
             if block is None:
                 raise InputError(
-                    f"{self._source.where}: has fewer rows than {beside}; expected one true pose "
-                    "for each"
+                    f"{self._where}: has fewer rows than {beside}; expected one true pose for each"
                 )
             self._values = np.concatenate([self._values, block.numbers(self._names)])
         values, self._values = self._values[:count], self._values[count:]
@@ -222,9 +231,7 @@ class _Feed:
     def finish(self, beside: str) -> None:
         """That nothing is left over."""
         left = len(self._values) or len(next(self._blocks, ()))
-        self._source.close()
         if left:
             raise InputError(
-                f"{self._source.where}: has more rows than {beside}; expected one true pose for "
-                "each"
+                f"{self._where}: has more rows than {beside}; expected one true pose for each"
             )

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.files.replace import replacing
+from gough.files.replace import check_target, replacing
 from gough.platform import Platform
 
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = (
@@ -40,7 +40,7 @@ CURVES: tuple[tuple[str, Any], ...] = (
 ENDINGS = (".svg", ".png", ".pdf")
 DPI = 160
 
-_RC = {
+_RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib, so pictures are the same everywhere
     "font.size": 9,
     "axes.titlesize": 9,
@@ -115,18 +115,23 @@ def save(figure: Figure, path: str | Path) -> None:
     Raises:
         GoughError: another ending, no such folder, a full disk.
     """
-    ending = check_ending(path)
+    ending = _ending(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(ending)
     with house_style(), replacing(path) as file:
         figure.savefig(file, format=ending[1:], dpi=DPI, metadata=metadata)
 
 
-def check_ending(path: str | Path) -> str:
-    """The ending of a picture's name.
+def check_picture(path: str | Path) -> None:
+    """That a picture can be put at `path`, without touching it.
 
     Raises:
-        GoughError: it is none that stands for a format.
+        GoughError: an ending that stands for no format, no such folder, a folder or a device.
     """
+    _ending(path)
+    check_target(path)
+
+
+def _ending(path: str | Path) -> str:
     ending = Path(path).suffix.lower()
     if ending not in ENDINGS:
         raise GoughError(f"{path}: a picture's name must end in .svg, .png or .pdf")

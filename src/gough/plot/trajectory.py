@@ -24,6 +24,7 @@ from gough.plot.style import (
 )
 
 SIGNALS = (*(f"leg {i}" for i in range(1, 7)), "x", "y", "z", "rx", "ry", "rz")
+MINUS = "\N{MINUS SIGN}"
 JUMP = 180.0  # [deg] an angle that changes more from row to row has gone round
 FAR = 8.0  # limits farther off than that many times the curves' range would flatten them
 
@@ -36,9 +37,7 @@ def signals(platform: Platform, readings: Array, position: Array, euler: Array) 
         position: (n, 3) [platform unit].
         euler: (n, 3) [rad].
     """
-    return np.concatenate(
-        [shown_readings(platform, readings), position, np.degrees(euler)], axis=1
-    )
+    return np.concatenate([shown_readings(platform, readings), position, np.degrees(euler)], axis=1)
 
 
 @styled
@@ -47,7 +46,7 @@ def trajectory_figure(
 ) -> Figure:
     """Leg readings, position and angles over time.
 
-    Stroke limits are thick grey lines. Rows without an answer leave a gap and a cross below.
+    Stroke limits are thick grey lines. Rows without a usable answer leave a gap and a cross below.
 
     Args:
         envelope: of the twelve `signals`, named `SIGNALS`.
@@ -84,8 +83,8 @@ def note(envelope: Envelope) -> str:
         )
     if envelope.unanswered:
         plural = "s" if envelope.unanswered > 1 else ""
-        parts.append(f"\N{MULTIPLICATION SIGN} {envelope.unanswered:,} row{plural} without an "
-                     "answer")  # fmt: skip
+        parts.append(f"\N{MULTIPLICATION SIGN} {envelope.unanswered:,} row{plural} without a "
+                     "usable answer")  # fmt: skip
     return "; ".join(parts)
 
 
@@ -110,8 +109,9 @@ def _legs(axes: Axes, platform: Platform, envelope: Envelope) -> None:
                 drawn += 1
             else:
                 text = f"{name} reading of the stroke, {value:.4g}, is outside the picture"
-                axes.annotate(text, (0.01, 0.02 + 0.9 * end), xycoords="axes fraction",
-                              fontsize=7.5, color=INK)  # fmt: skip
+                axes.annotate(text.replace("-", MINUS), (0.01, 0.02 + 0.92 * end),
+                              xycoords="axes fraction", fontsize=7.5, color=INK,
+                              bbox={"color": "white", "alpha": 0.8, "pad": 1})  # fmt: skip
 
 
 def _position(axes: Axes, platform: Platform, envelope: Envelope) -> None:
@@ -119,7 +119,7 @@ def _position(axes: Axes, platform: Platform, envelope: Envelope) -> None:
     home = platform.home.position
     names = []
     for name, value in zip("xyz", home, strict=True):
-        sign = "\N{MINUS SIGN}" if value > 0 else "+"
+        sign = MINUS if value > 0 else "+"
         text = number(abs(value), platform.size)
         names.append(name if not value else f"{name} {sign} {text.rstrip('0').rstrip('.')}")
     _curves(axes, envelope, range(6, 9), names, offsets=home)
@@ -143,7 +143,7 @@ def _curves(axes: Axes, envelope: Envelope, which, names, *, offsets=None, wrap=
 
 
 def _gaps(axes: Axes, envelope: Envelope) -> None:
-    """A cross at the bottom for every bin that holds rows without an answer."""
+    """A cross at the bottom for every bin that holds rows without a usable answer."""
     x = envelope.x[envelope.missing > 0]
     if len(x):
         axes.plot(x, np.full(len(x), 0.03), "x", color=VERMILION, markersize=5, label="_gap",

@@ -1,0 +1,50 @@
+"""Make the pictures of the documents by the commands that stand beside them.
+
+    python tools/pictures.py            (make pictures)
+
+Runs every `gough` line of the bash blocks of docs/plots.md in one empty folder that has the
+`examples`, and moves the .svg files that they write to docs/images.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE, IMAGES = ROOT / "docs" / "plots.md", ROOT / "docs" / "images"
+BLOCK = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def commands(page: Path = PAGE) -> list[str]:
+    """The `gough` lines of a page, lines that go on after a backslash joined."""
+    blocks = [block.replace("\\\n", " ") for block in BLOCK.findall(page.read_text("utf-8"))]
+    lines = [" ".join(line.split()) for block in blocks for line in block.splitlines()]
+    return [line.partition(" #")[0] for line in lines if line.startswith("gough ")]
+
+
+def make(images: Path = IMAGES) -> list[Path]:
+    """Run the commands; the pictures that were made."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "examples").symlink_to(ROOT / "examples")
+        for line in commands():
+            print(line, flush=True)
+            arguments = [sys.executable, "-m", "gough.cli", *shlex.split(line)[1:]]
+            done = subprocess.run(
+                arguments, check=False, cwd=folder, env=os.environ, capture_output=True, text=True
+            )
+            if done.returncode:
+                raise SystemExit(f"exit code {done.returncode}: {line}\n{done.stderr}")
+        made = sorted(Path(folder).glob("*.svg"))
+        return [Path(shutil.copy(picture, images / picture.name)) for picture in made]
+
+
+if __name__ == "__main__":
+    for picture in make():
+        print(f"{picture.relative_to(ROOT)}: {picture.stat().st_size / 1000:.0f} kB")
