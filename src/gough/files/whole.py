@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 
 from gough.checks import Array
+from gough.columns import LEGS, leg_columns
 from gough.files.identity import check_same, describe
-from gough.files.names import LEGS, leg_columns
 from gough.files.sink import open_sink
 from gough.files.source import Reading, open_source
 from gough.platform import Platform
@@ -33,9 +33,7 @@ def read_legs(path: str | Path, platform: Platform) -> Array:
         return np.concatenate([block.numbers(LEGS) for block in blocks])
 
 
-def write_table(
-    path: str | Path, columns: Mapping[str, pa.Array], platform: Platform
-) -> None:
+def write_table(path: str | Path, columns: Mapping[str, pa.Array], platform: Platform) -> None:
     """Write columns to a .csv or .parquet file, or to standard output for "-".
 
     Raises:

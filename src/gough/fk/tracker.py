@@ -16,6 +16,9 @@ from gough.fk.track_kernel import BAD_READING, CROSSED, FAILED, STATE, cycle
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.tables import Table, as_readings
+
+PLAIN = (np.ndarray, list, tuple)  # readings without names, told apart quickly
 
 
 class Event(IntEnum):
@@ -124,13 +127,17 @@ class Tracker:
         """What is known about the last reading."""
         return Status(self._code)
 
-    def update(self, legs: ArrayLike) -> Pose:
+    def update(self, legs: ArrayLike | Table) -> Pose:
         """The pose at the next reading (6,); `status` and `event` tell how far to trust it.
+
+        A row of a pandas table is a reading, too: it is read by its labels, leg_1 to leg_6.
 
         Raises:
             GoughError: not six numbers. A reading that is NaN or impossible raises nothing.
         """
         try:
+            if type(legs) not in PLAIN:
+                legs = as_readings(legs)
             if len(legs) != 6:  # type: ignore[arg-type]
                 raise GoughError(f"legs: expected (6,), got {np.shape(legs)}")
             self._legs[0] = legs
