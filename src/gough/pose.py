@@ -286,6 +286,13 @@ class Pose:
         numbers = [", ".join(f"{v:.9g}" for v in row) for row in (self.position, self.wxyz)]
         return f"Pose(position=({numbers[0]}), wxyz=({numbers[1]}))"
 
+    def _repr_html_(self) -> str:
+        from gough.html import page, pose_cells, pose_heads, rows_of
+
+        count = "one pose" if not self.batch else f"{len(self.position.reshape(-1, 3)):,} poses"
+        rows = rows_of(self.batch, lambda i: pose_cells(self[i] if i else self))
+        return page(f"Pose: {count}", pose_heads(self.batch, ""), rows)
+
 
 def _no_rotation(wxyz: Array, norm: Array) -> str:
     if np.any(norm == 0):

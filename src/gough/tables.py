@@ -70,7 +70,7 @@ def as_readings(legs: ArrayLike | Table) -> Array:
     names = column_names(legs)
     if names is not None:
         return _numbers("legs", legs, leg_columns("legs", names))
-    if _is_arrow(legs):
+    if is_arrow(legs):
         return as_batch("legs", _row("legs", legs), (6,))
     return as_batch("legs", legs, (6,))
 
@@ -138,7 +138,7 @@ def column_names(value: Any) -> list[str] | None:
     Raises:
         InputError: a table whose rows have not been computed yet.
     """
-    if not _is_arrow(value):
+    if not is_arrow(value):
         if type(value).__name__ == "LazyFrame" and _library(value) == "polars":
             raise InputError("a polars LazyFrame has no rows yet; call .collect() first")
         return None
@@ -151,7 +151,7 @@ def column_names(value: Any) -> list[str] | None:
     return [name if isinstance(name, str) else repr(name) for name in names]
 
 
-def _is_arrow(value: object) -> bool:
+def is_arrow(value: object) -> bool:
     """Whether a value hands out Arrow data, or is pandas', of which old ones do not."""
     protocol = hasattr(value, "__arrow_c_stream__") or hasattr(value, "__arrow_c_array__")
     return protocol or _library(value) == "pandas"
@@ -204,8 +204,8 @@ def _column(where: str, column: Any, name: str) -> np.ndarray | pa.ChunkedArray 
             found = column
         else:
             found = pa.array(column, from_pandas=True) if pandas else pa.chunked_array(column)
-    except (pa.ArrowException, TypeError, ValueError) as error:
-        reason = str(error).splitlines()[0]
+    except Exception as error:  # each library has its own for what Arrow cannot hold
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
             f"{where}: column {name}: expected numbers; {reason}; convert the column to float64"
         ) from None

@@ -25,6 +25,7 @@ assumed of Y, which is inverted without care and judged by its delta.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,6 +75,25 @@ class Certificate:
     radius: Array
     error: Array
     unit: str = ""
+
+    def __getitem__(self, index: Any) -> Certificate:
+        return Certificate(self.certified[index], self.radius[index], self.error[index], self.unit)
+
+    def __repr__(self) -> str:
+        known = self.radius[self.certified]
+        unit = f" [{self.unit}]" if self.unit else ""
+        told = f"; smallest radius {np.min(known):.3g}{unit}" if np.size(known) else ""
+        return f"Certificate({np.sum(self.certified)} of {np.size(self.certified)} certified{told})"
+
+    def _repr_html_(self) -> str:
+        from gough.html import length_head, number, page, rows_of
+
+        def cells(i: tuple[int, ...]) -> list[str]:
+            at = self[i]
+            return ["yes" if at.certified else "no", number(at.radius), number(at.error, ".2g")]
+
+        heads = ["", "certified", length_head("radius", self.unit), length_head("error", self.unit)]
+        return page(repr(self), heads, rows_of(np.shape(self.certified), cells))
 
 
 def certify(platform: Platform, legs: ArrayLike | Table, pose: Pose) -> Certificate:

@@ -160,3 +160,19 @@ class Solution:
             )
         found = ", ".join(f"{s.label}: {n}" for s, n in self.counts().items())
         return f"Solution(batch {self.pose.batch}; {found})"
+
+    def _repr_html_(self) -> str:
+        from gough.html import length_head, number, page, pose_cells, pose_heads, rows_of
+
+        def cells(i: tuple[int, ...]) -> list[str]:
+            at = self[i] if i else self
+            radius = [] if at.radius is None else [number(at.radius, ".3g")]
+            last = [number(at.residual, ".2g"), str(int(at.iterations))]
+            return [*pose_cells(at.pose), Status(int(at.status)).label, *last, *radius]
+
+        heads = [*pose_heads(self.pose.batch, self.unit), "status"]
+        heads += [length_head("residual", self.unit), "iterations"]
+        heads += [] if self.radius is None else [length_head("radius", self.unit)]
+        notes = [f"{n:,} {s.label}: {s.text}" for s, n in self.counts().items()]
+        rows = rows_of(self.pose.batch, cells)
+        return page(f"Solution: {np.size(self.status):,} solved", heads, rows, notes)

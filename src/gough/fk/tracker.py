@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from enum import IntEnum
 
 import numpy as np
@@ -16,7 +17,7 @@ from gough.fk.track_kernel import BAD_READING, CROSSED, FAILED, STATE, cycle
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.tables import Table, as_readings
+from gough.tables import Table, as_readings, is_arrow
 
 PLAIN = (np.ndarray, list, tuple)  # readings without names, told apart quickly
 
@@ -135,14 +136,14 @@ class Tracker:
         Raises:
             GoughError: not six numbers. A reading that is NaN or impossible raises nothing.
         """
+        if type(legs) not in PLAIN and is_arrow(legs):
+            legs = as_readings(legs)
         try:
-            if type(legs) not in PLAIN:
-                legs = as_readings(legs)
             if len(legs) != 6:  # type: ignore[arg-type]
                 raise GoughError(f"legs: expected (6,), got {np.shape(legs)}")
             self._legs[0] = legs
         except (TypeError, ValueError) as error:
-            raise GoughError(f"legs: expected six numbers, found {legs!r}") from error
+            raise GoughError(f"legs: expected six numbers, found {reprlib.repr(legs)}") from error
         code = FAILED if self._lost else self._run()
         if code >= layout.OPEN:
             self._doubt(code)
@@ -151,6 +152,18 @@ class Tracker:
             if self._missed:
                 self._forget()
         return self.pose
+
+    def __repr__(self) -> str:
+        told = f"{self.event.name.lower()}, {self.status.label}"
+        return f"Tracker({self.platform.name!r}, {told}, {self.pose!r})"
+
+    def _repr_html_(self) -> str:
+        from gough.html import page, pose_cells, pose_heads
+
+        heads = [*pose_heads((), self.platform.unit), "event", "status"]
+        cells = ["", *pose_cells(self.pose), self.event.name.lower(), self.status.label]
+        notes = [self.event.text] + [self.status.text] * (self.event != Event.FOLLOWED)
+        return page(f"Tracker of {self.platform.name}", heads, [cells], notes)
 
     # ---- a cycle that went well -------------------------------------------------------
 

@@ -159,7 +159,7 @@ class AssemblyModes:
         return replace(
             self, legs=self.legs[index], pose=self.pose[mine], row=np.zeros(mine.sum(), int),
             multiplicity=self.multiplicity[mine], status=self.status[index],
-            certificate=Certificate(proof.certified[mine], proof.radius[mine], proof.error[mine], proof.unit),
+            certificate=proof[mine],
             paths=self.paths[index],
             origin=self.origin and self.origin.at(np.full(mine.sum(), index)),
         )  # fmt: skip
@@ -194,6 +194,28 @@ class AssemblyModes:
             label = ModesStatus(int(self.status)).label
             return f"AssemblyModes({len(self.row)} poses, {label})"
         return f"AssemblyModes({len(self.row)} poses of {len(self.legs)} sets of readings)"
+
+    def _repr_html_(self) -> str:
+        from gough.html import length_head, number, page, pose_cells, pose_heads, rows_of
+
+        def cells(i: tuple[int, ...]) -> list[str]:
+            k = i[0]
+            one = self.certificate[k]
+            proof = number(one.radius) if one.certified else "not proven"
+            told = [number(self.residual[k], ".2g"), proof, number(self.singularity_distance[k])]
+            return [*([str(self.row[k])] if several else []), *pose_cells(self.pose[k]), *told]
+
+        several, unit = self.legs.ndim > 1, self.platform.unit
+        first, *heads = pose_heads((len(self.row),), unit)
+        heads = [first, *(["set"] if several else []), *heads, length_head("residual", unit)]
+        heads += [length_head("radius", unit), "to singularity"]
+        codes, times = np.unique(self.status, return_counts=True)
+        notes = [
+            f"{n:,} {ModesStatus(s).label}: {ModesStatus(s).text}"
+            for s, n in zip(codes.tolist(), times.tolist(), strict=True)
+        ]
+        title = f"{self!r} of {self.platform.name}"
+        return page(title, heads, rows_of((len(self.row),), cells), notes)
 
 
 def mode_columns(modes: AssemblyModes, angles: Angles | None) -> dict[str, pa.Array]:
