@@ -173,6 +173,10 @@ class Solution:
         heads = [*pose_heads(self.pose.batch, self.unit), "status"]
         heads += [length_head("residual", self.unit), "iterations"]
         heads += [] if self.radius is None else [length_head("radius", self.unit)]
-        notes = [f"{n:,} {s.label}: {s.text}" for s, n in self.counts().items()]
+        notes = []
+        for status, times in self.counts().items():
+            first = np.argwhere(np.asarray(self.status) == status)[0].tolist()
+            where = f", first in row {', '.join(map(str, first))}" if first else ""
+            notes.append(f"{times:,} {status.label}{where}: {status.text}")
         rows = rows_of(self.pose.batch, cells)
-        return page(f"Solution: {np.size(self.status):,} solved", heads, rows, notes)
+        return page(f"Solution of {np.size(self.status):,}", heads, rows, notes)
