@@ -79,11 +79,7 @@ def _draw_together(figure: Any, modes: AssemblyModes, base: Array, joints: Array
 
 
 def _draw_apart(
-    figure: Any,
-    base: Array,
-    joints: Array,
-    sign: Array,
-    shape: tuple[int, int],
+    figure: Any, base: Array, joints: Array, sign: Array, shape: tuple[int, int],
     frame: tuple[Array, Array],
 ) -> None:
     """Each pose by itself, all to one scale, seen from the front, right and above."""

@@ -19,7 +19,6 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from gough.checks import Array
 from gough.kinematics import assembly_sign, singularity_distance
-from gough.platform import Platform
 from gough.plot.shapes import Skeleton, outline_order, skeleton
 from gough.plot.style import (
     BLUE,
@@ -36,6 +35,7 @@ from gough.plot.style import (
     shown_readings,
     styled,
 )
+from gough.platform import Platform
 from gough.pose import Pose
 
 STROKE = ("viridis", 0.0, 0.9)  # colour map of the stroke, without its palest part
@@ -114,7 +114,9 @@ def draw_pose(
 
 
 @styled
-def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111) -> Axes3D:
+def pose_axes(
+    figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111
+) -> Axes3D:
     """3-D axes to scale that hold all of `poses`, with units.
 
     Args:

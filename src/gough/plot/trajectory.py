@@ -36,7 +36,9 @@ def signals(platform: Platform, readings: Array, position: Array, euler: Array) 
         position: (n, 3) [platform unit].
         euler: (n, 3) [rad].
     """
-    return np.concatenate([shown_readings(platform, readings), position, np.degrees(euler)], axis=1)
+    return np.concatenate(
+        [shown_readings(platform, readings), position, np.degrees(euler)], axis=1
+    )
 
 
 @styled

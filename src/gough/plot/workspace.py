@@ -309,7 +309,9 @@ def _span(platform: Platform, fixed: dict[str, float], name: str) -> tuple[float
     return _checked(name, low, high)
 
 
-def _first_outside(platform: Platform, fixed: dict[str, float], name: str, values: Array) -> int:
+def _first_outside(
+    platform: Platform, fixed: dict[str, float], name: str, values: Array
+) -> int:
     """How many steps along `values` all readings are within their stroke; 1 at least."""
     margin = stroke_margin(platform, _poses({**fixed, name: values})).min(axis=-1)
     outside = np.flatnonzero(~(margin >= 0))
