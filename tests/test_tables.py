@@ -7,12 +7,14 @@ import decimal
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -455,3 +457,13 @@ def test_frames_of_poses_keep_every_bit(seed: int) -> None:
     back = gough.Pose.from_frame(poses.to_frame())
     np.testing.assert_array_equal(back.position, poses.position)
     np.testing.assert_allclose(back.wxyz, poses.wxyz, rtol=0, atol=1e-16)
+
+
+def test_a_file_of_certified_poses_has_their_radius(tmp_path: Path) -> None:
+    from gough.files import solve_file
+
+    pq.write_table(pa.table(columns_of(READINGS)), tmp_path / "legs.parquet")
+    out = tmp_path / "poses.parquet"
+    solve_file(tmp_path / "legs.parquet", out, PLATFORM, leg_noise=0.1, certify=True)
+    frame = gough.solve(PLATFORM, READINGS, leg_noise=0.1, certify=True).to_frame("pyarrow")
+    assert pq.read_table(out).replace_schema_metadata(None).equals(frame)

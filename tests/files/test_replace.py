@@ -168,3 +168,12 @@ def test_other_names_folders_and_links_stay(tmp_path):
     with replacing(tmp_path / "poses.csv"):
         pass
     assert sorted(os.listdir(tmp_path)) == sorted([*before, "poses.csv"])
+
+
+def test_a_file_that_nobody_holds_stays_while_its_process_runs(tmp_path):
+    """As between making a file and locking it, or where a file system knows no locks."""
+    path = tmp_path / f"poses.csv.{os.getppid()}.partial"
+    path.write_text("half")
+    with replacing(tmp_path / "poses.csv"):
+        pass
+    assert path.exists()
