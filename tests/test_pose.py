@@ -8,7 +8,7 @@ import support
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 from support import BATCHES, Floats, assert_same_pose
 
 from gough import GoughError, Pose
@@ -305,3 +305,59 @@ def test_poses_are_frozen() -> None:
 def test_repr_shows_one_pose_and_sums_up_many() -> None:
     assert repr(ONE) == "Pose(position=(1, 2, 3), wxyz=(0.5, 0.5, -0.5, 0.5))"
     assert repr(Pose.identity((7,))) == "Pose(batch (7,))"
+
+
+# ---- to and from others ---------------------------------------------------------------
+
+RPY = st.tuples(*[st.floats(-np.pi, np.pi)] * 3) | st.tuples(
+    st.floats(-np.pi, np.pi),
+    st.sampled_from([np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, 1e-9 - np.pi / 2]),
+    st.floats(-np.pi, np.pi),
+)  # gimbal lock and next to it
+
+
+@given(RPY)
+def test_roll_pitch_yaw_are_turns_about_fixed_axes_as_in_scipy(rpy: tuple) -> None:
+    pose = Pose.from_rpy((1.0, 2.0, 3.0), rpy)
+    theirs = Rotation.from_euler("xyz", rpy)
+    np.testing.assert_allclose(pose.rotation, theirs.as_matrix(), rtol=0, atol=1e-15)
+    roll, pitch, yaw = pose.rpy
+    again = Rotation.from_euler("xyz", (roll, pitch, yaw))
+    np.testing.assert_allclose(again.as_matrix(), theirs.as_matrix(), rtol=0, atol=2e-15)
+    assert abs(pitch) <= np.pi / 2 + 1e-15
+
+
+@given(support.batches, support.seeds)
+def test_roll_pitch_yaw_of_batches(batch: tuple, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(-1.5, 1.5, (*batch, 3))
+    pose = Pose.from_rpy(rng.standard_normal((*batch, 3)), angles)
+    assert pose.batch == batch
+    np.testing.assert_allclose(pose.rpy, angles, rtol=0, atol=1e-14)
+    # the z-y-x order, from the axes one by one
+    x, y, z = (Pose.from_euler(np.zeros(3), angles * np.eye(3)[i]).rotation for i in range(3))
+    np.testing.assert_allclose(pose.rotation, z @ y @ x, rtol=0, atol=1e-15)
+
+
+@given(support.poses)
+def test_scipy_rotations_come_back_as_they_were(pose: Pose) -> None:
+    flat = Pose(pose.position.reshape(-1, 3), pose.wxyz.reshape(-1, 4))
+    theirs = flat.as_scipy()
+    np.testing.assert_allclose(theirs.as_matrix(), flat.rotation, rtol=0, atol=4e-15)
+    support.assert_same_pose(Pose.from_scipy(flat.position, theirs), flat, 4e-15)
+    rigid = RigidTransform.from_matrix(flat.matrix)
+    support.assert_same_pose(Pose.from_matrix(rigid.as_matrix()), flat, 1e-14)
+
+
+def test_one_scipy_rotation_serves_many_positions() -> None:
+    turn = Rotation.from_euler("XYZ", (10, 20, 30), degrees=True)
+    poses = Pose.from_scipy(np.zeros((4, 3)), turn)
+    assert poses.batch == (4,)
+    np.testing.assert_allclose(np.degrees(poses.euler), [(10, 20, 30)] * 4, atol=1e-12)
+    assert Pose.from_scipy(np.zeros(3), turn).as_scipy().approx_equal(turn, 1e-15)
+
+
+def test_rows_of_nan_are_no_scipy_rotation() -> None:
+    pose = Pose.trusted(np.full((2, 3), np.nan), np.full((2, 4), np.nan))
+    with pytest.raises(GoughError, match=r"rows of NaN.*solution\.pose\[solution\.usable\]"):
+        pose.as_scipy()

@@ -22,6 +22,7 @@ from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.tables import Table, as_pose, as_readings
 
 
 def joint_positions(platform: Platform, pose: Pose) -> Array:
@@ -37,23 +38,28 @@ def strut_vectors(platform: Platform, pose: Pose) -> Array:
     return joint_positions(platform, pose) - platform.base
 
 
-def leg_lengths(platform: Platform, pose: Pose) -> Array:
+def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
     """Inverse kinematics: the readings of the six legs, (..., 6).
 
     Args:
-        pose: batch axes (...).
+        pose: batch axes (...), or a table of N poses (see `Pose.from_frame`).
 
     Returns:
         Lengths [platform unit], lengths minus those at home [platform unit], or motor angles
-        [rad], by the platform's kind of leg. NaN where a motor's arm and rod cannot reach.
+        [rad], by the platform's kind of leg. NaN where a motor's arm and rod cannot reach, and
+        where a row of a table holds no pose.
+
+    Raises:
+        GoughError: neither poses nor a table, or a table with other columns.
     """
+    pose = as_pose(pose)
     if platform.rotary is not None:
         return _motor_angles(platform, pose)
     lengths = np.linalg.norm(strut_vectors(platform, pose), axis=-1)
     return lengths - platform.home_lengths if platform.legs == "length_change" else lengths
 
 
-def equivalent_struts(platform: Platform, legs: ArrayLike) -> tuple[Array, Array]:
+def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Array, Array]:
     """The telescopic hexapod that readings stand for: where its struts start, how long they are.
 
     Args:
@@ -62,7 +68,7 @@ def equivalent_struts(platform: Platform, legs: ArrayLike) -> tuple[Array, Array
     Returns:
         Base joints (..., 6, 3) and strut lengths (..., 6) [platform unit].
     """
-    readings = as_batch("legs", legs, (6,))
+    readings = as_readings(legs)
     if platform.rotary is not None:
         arms = platform.rotary
         tips = platform.base + arms.arm_length * _arm_directions(platform, readings)[0]

@@ -298,6 +298,18 @@ class Platform:
         unit = self.unit or "unit not named"
         return f"Platform({self.name!r}, {self.legs} legs, size {self.size:.4g} [{unit}])"
 
+    def _repr_html_(self) -> str:
+        from gough.html import page, platform_notes, vector
+
+        unit = self.unit or "unit not named"
+        reading = "rad" if self.legs == "rotary" else unit
+        heads = ["leg", f"base joint [{unit}]", f"platform joint [{unit}]", f"home [{reading}]"]
+        columns = [map(vector, self.base), map(vector, self.moving), map(vector, self.home_legs)]
+        stroke = [] if self.stroke is None else [f"stroke [{reading}]"]
+        limits = [] if self.stroke is None else [[vector(pair, " to ") for pair in self.stroke]]
+        rows = zip("123456", *columns, *limits, strict=True)
+        return page(repr(self), heads + stroke, rows, platform_notes(self))
+
 
 def _joints(name: str, value: ArrayLike) -> Array:
     array = platform_numbers(name, value)

@@ -7,7 +7,7 @@ vectors; Euler angles are the paper's, R = Rx(a) Ry(b) Rz(c).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,13 @@ from numpy.typing import ArrayLike
 from gough.checks import LARGEST, Array, as_batch
 from gough.errors import GoughError
 
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+    from gough.columns import Angles
+    from gough.tables import Kind, Table
+
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # times a quaternion: the inverse rotation
 SERIES_ANGLE = 0.3  # [rad] below it, series whose first dropped term is under 1e-15
 
 
@@ -108,6 +115,37 @@ class Pose:
         position = rho + a * once + b * np.cross(omega, once)
         return cls(position, rotation_vector_to_wxyz(omega))
 
+    @classmethod
+    def from_rpy(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
+        """From (..., 3) and roll, pitch, yaw (..., 3) [rad], R = Rz(yaw) Ry(pitch) Rx(roll).
+
+        That is a turn about the fixed x, then y, then z axis: what ROS, URDF and most vehicles
+        mean by it. It is not `from_euler`, whose turns come in the other order.
+        """
+        rpy = as_batch("angles", angles, (3,))
+        mirrored = cls.from_euler(np.zeros(3), -rpy)  # Rx(-r) Ry(-p) Rz(-y), the inverse
+        return cls(position, mirrored.wxyz * CONJUGATE)
+
+    @classmethod
+    def from_scipy(cls, position: ArrayLike, rotation: Rotation) -> Pose:
+        """From (..., 3) and a `scipy.spatial.transform.Rotation`, one or as many as positions."""
+        return cls(position, np.roll(rotation.as_quat(), 1, axis=-1))
+
+    @classmethod
+    def from_frame(cls, frame: Table) -> Pose:
+        """From a pandas, polars, pyarrow or other Arrow table, batch (N,).
+
+        Columns x, y, z and qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg
+        (R = Rx Ry Rz); others are ignored. Rows with absent values, or whose quaternion's length
+        is off by more than 0.001, are NaN throughout.
+
+        Raises:
+            GoughError: no table. InputError: other columns, or no numbers in them.
+        """
+        from gough.tables import as_pose
+
+        return as_pose(frame)
+
     # ---- seen as ----------------------------------------------------------------------
 
     @property
@@ -140,6 +178,30 @@ class Pose:
             for angle in (plus + minus, plus - minus)
         )
         return np.stack([a, b, c], axis=-1)
+
+    @property
+    def rpy(self) -> Array:
+        """Roll, pitch, yaw (..., 3) [rad], R = Rz(yaw) Ry(pitch) Rx(roll), pitch within +-pi/2.
+
+        At pitch +-pi/2 only the sum or the difference of the others is determined; the angles
+        describe the rotation there, too.
+        """
+        return -Pose(np.zeros(3), self.wxyz * CONJUGATE).euler
+
+    def as_scipy(self) -> Rotation:
+        """The rotations as a `scipy.spatial.transform.Rotation`; the position is not in it.
+
+        Raises:
+            GoughError: a row of NaN, which SciPy has no rotation for.
+        """
+        from scipy.spatial.transform import Rotation
+
+        if np.any(np.isnan(self.wxyz)):
+            raise GoughError(
+                "pose: has rows of NaN, which are no rotations; take the others, such as "
+                "solution.pose[solution.usable]"
+            )
+        return Rotation.from_quat(np.roll(self.wxyz, -1, axis=-1))
 
     @property
     def rotation_vector(self) -> Array:
@@ -184,13 +246,28 @@ class Pose:
         p = as_batch("points", points, (3,))
         return (self.rotation @ p[..., None])[..., 0] + self.position
 
+    def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
+        """A table with a row for each pose; `from_frame` reads it.
+
+        Args:
+            kind: "pandas", "polars" or "pyarrow"; pandas unless given.
+            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz), in
+                place of the quaternion.
+
+        Raises:
+            GoughError: another kind or angle, or a library that is not installed.
+        """
+        from gough.tables import make_frame, pose_table
+
+        return make_frame(pose_table(self, angles), kind)
+
     def copy(self) -> Pose:
         """A pose with arrays of its own."""
         return Pose.trusted(self.position.copy(), self.wxyz.copy())
 
     def inverse(self) -> Pose:
         """The pose that undoes this one."""
-        conj = self.wxyz * np.array([1.0, -1.0, -1.0, -1.0])
+        conj = self.wxyz * CONJUGATE
         return Pose(-(wxyz_to_matrix(conj) @ self.position[..., None])[..., 0], conj)
 
     def __matmul__(self, other: Pose) -> Pose:
@@ -200,7 +277,7 @@ class Pose:
     def distance(self, other: Pose) -> tuple[Array, Array]:
         """Distance of positions (...) [unit] and angle between orientations (...) [rad]."""
         shift = np.linalg.norm(self.position - other.position, axis=-1)
-        turn = wxyz_product(self.wxyz * np.array([1.0, -1.0, -1.0, -1.0]), other.wxyz)
+        turn = wxyz_product(self.wxyz * CONJUGATE, other.wxyz)
         return shift, 2 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
 
     def __repr__(self) -> str:
@@ -208,6 +285,13 @@ class Pose:
             return f"Pose(batch {self.batch})"
         numbers = [", ".join(f"{v:.9g}" for v in row) for row in (self.position, self.wxyz)]
         return f"Pose(position=({numbers[0]}), wxyz=({numbers[1]}))"
+
+    def _repr_html_(self) -> str:
+        from gough.html import page, pose_cells, pose_heads, rows_of
+
+        count = "one pose" if not self.batch else f"{len(self.position.reshape(-1, 3)):,} poses"
+        rows = rows_of(self.batch, lambda i: pose_cells(self[i] if i else self))
+        return page(f"Pose: {count}", pose_heads(self.batch, ""), rows)
 
 
 def _no_rotation(wxyz: Array, norm: Array) -> str:

@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gough as library
+from gough.columns import LEGS
 from gough.commands import COMMANDS
-from gough.files.names import LEGS
 
 from .conftest import EXAMPLE, process
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import gough
-from gough.files.names import LEGS
+from gough.columns import LEGS
 
 
 @pytest.fixture(scope="session")

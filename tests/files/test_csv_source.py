@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gough.columns import LEGS
 from gough.errors import InputError
 from gough.files.csv_source import CsvSource
-from gough.files.names import LEGS
 from gough.files.sink import CsvSink
 
 from .conftest import csv_text

@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import gough
+from gough.columns import DEVIATIONS, EULER, EULER_DEG, LEGS, POSITION, QUATERNION
 from gough.errors import GoughError, InputError
 from gough.files import Reading, inverse_file, solve_file
-from gough.files.names import DEVIATIONS, EULER, EULER_DEG, LEGS, POSITION, QUATERNION
 from gough.fk.status import Status
 
 

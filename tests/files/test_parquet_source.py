@@ -10,9 +10,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gough.columns import LEGS
 from gough.errors import InputError
 from gough.files.block import Block
-from gough.files.names import LEGS
 from gough.files.source import open_source
 
 from .conftest import parquet_table

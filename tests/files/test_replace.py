@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import stat
+import subprocess
+import sys
 
 import pytest
 
@@ -84,3 +87,93 @@ def test_a_signal_right_after_the_file_is_made_leaves_nothing(tmp_path, monkeypa
     with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "poses.csv"):
         pass
     assert os.listdir(tmp_path) == []
+
+
+KILLED = """
+import os, signal, sys
+from gough.files.replace import replacing
+with replacing(sys.argv[1]) as file:
+    file.write(b"half")
+    file.flush()
+    if sys.argv[2] == "wait":
+        print("ready", flush=True)
+        sys.stdin.read()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def start_writing(path, then):
+    return subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(path), then],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text("old")
+    with start_writing(path, "die") as killed:
+        assert killed.wait() == -9
+    assert sorted(os.listdir(tmp_path)) == ["poses.csv", f"poses.csv.{killed.pid}.partial"]
+    with replacing(path) as file:
+        file.write(b"new")
+    assert os.listdir(tmp_path) == ["poses.csv"]
+    assert path.read_text() == "new"
+
+
+def test_what_a_running_process_writes_stays(tmp_path):
+    path = tmp_path / "poses.csv"
+    with start_writing(path, "wait") as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == "ready\n"
+        with replacing(path) as file:
+            file.write(b"new")
+        assert (tmp_path / f"poses.csv.{running.pid}.partial").read_text() == "half"
+        running.kill()
+
+
+def free_number():
+    """The number of a process that is over."""
+    with subprocess.Popen([sys.executable, "-c", ""]) as done:
+        done.wait()
+    return done.pid
+
+
+def test_a_file_that_is_held_stays_although_no_process_here_has_its_number(tmp_path):
+    """As from another machine or container on the same folder."""
+    held = tmp_path / f"poses.csv.{free_number()}.partial"
+    held.write_text("half")
+    with open(held, "rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with replacing(tmp_path / "poses.csv"):
+            pass
+        assert held.exists()
+    with replacing(tmp_path / "poses.csv"):
+        pass
+    assert not held.exists()
+
+
+def test_other_names_folders_and_links_stay(tmp_path):
+    number = free_number()
+    names = [
+        f"legs.csv.{number}.partial", f"xposes.csv.{number}.partial", "poses.csv.partial",
+        f"poses_csv.{number}.partial", f"poses.csv.0{number}.partial", f"poses.csv.{number}.part",
+        "poses.csv.-1.partial", "poses.csv.0.partial", "poses.csv.abc.partial",
+    ]  # fmt: skip
+    for name in names:
+        (tmp_path / name).write_text("mine")
+    (tmp_path / f"poses.csv.{number}.partial").symlink_to(tmp_path / names[0])
+    os.mkdir(tmp_path / f"legs.csv.{free_number()}.partial.d")
+    before = sorted(os.listdir(tmp_path))
+    with replacing(tmp_path / "poses.csv"):
+        pass
+    assert sorted(os.listdir(tmp_path)) == sorted([*before, "poses.csv"])
+
+
+def test_a_file_that_nobody_holds_stays_while_its_process_runs(tmp_path):
+    """As between making a file and locking it, or where a file system knows no locks."""
+    path = tmp_path / f"poses.csv.{os.getppid()}.partial"
+    path.write_text("half")
+    with replacing(tmp_path / "poses.csv"):
+        pass
+    assert path.exists()

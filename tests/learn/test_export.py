@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,3 +182,39 @@ def test_onnx_of_a_double_network_keeps_its_digits(legs):
     session = onnxruntime.InferenceSession(content)
     raw = np.asarray(session.run(None, {"legs": legs})[0])
     np.testing.assert_allclose(raw, model.raw(torch.tensor(legs)).detach(), rtol=1e-9, atol=1e-10)
+
+
+QUIET = """
+import logging, sys, warnings
+sys.path.insert(0, {tests!r})
+warnings.simplefilter("always")
+import torch
+from learn.machines import network, reference, tiny
+from gough.learn import export
+
+class Talking(torch.nn.Module):
+    def __init__(self, model):
+        super().__init__()
+        self.model = model
+
+    def forward(self, legs):
+        warnings.warn("a real warning")
+        logging.getLogger("torch.onnx").error("a real error")
+        return self.model.raw(legs)
+
+export._Raw = Talking
+model = network("disgnet", reference(), width=16)
+model.cast(torch.float32)
+export.to_onnx(model, export.facts_of(model, tiny(), {{}}))
+"""
+
+
+def test_exporting_says_nothing_of_its_own_and_hides_nothing_else():
+    tests = str(Path(__file__).resolve().parent.parent)
+    code = QUIET.format(tests=tests)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == ""
+    assert "a real warning" in done.stderr
+    assert "a real error" in done.stderr
+    for line in done.stderr.splitlines():
+        assert "a real" in line or "warnings.warn(" in line, done.stderr

@@ -174,28 +174,15 @@ def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
 
 
 def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
-    """One row for each pose."""
+    """One row for each pose, the best of its set of readings first."""
     import numpy as np
-    import pyarrow as pa
 
-    from gough.files.block import label_column, number_column
+    from gough.arrow import number_column
     from gough.files.whole import write_table
-    from gough.modes.result import ModesStatus
+    from gough.modes.result import mode_columns
 
-    order = np.lexsort((choice.rank, modes.row))
-    truth = lambda values: pa.array(values[order].tolist(), pa.bool_())  # noqa: E731
-    number = lambda values: number_column(values[order])  # noqa: E731
-    columns = {"row": number(modes.row), "pose": number(choice.rank + 1)}
-    columns |= dict(zip("xyz", map(number, modes.pose.position.T), strict=True))
-    columns |= dict(zip(("qw", "qx", "qy", "qz"), map(number, modes.pose.wxyz.T), strict=True))
-    codes = np.ravel(modes.status)[modes.row][order]
-    columns["status"] = label_column(codes, [status.label for status in ModesStatus])
-    columns["residual"] = number(modes.residual)
-    columns["multiplicity"] = number(modes.multiplicity)
-    columns["certified"] = truth(modes.certified)
-    columns["radius"] = number(modes.certificate.radius)
-    columns["error"] = number(modes.certificate.error)
-    columns["sigma_min"] = number(modes.singularity_distance)
-    columns["sign"] = number(modes.sign)
-    columns |= {f"passes_{name}": truth(passed) for name, passed in choice.passes.items()}
-    write_table(path, columns, modes.platform)
+    columns = mode_columns(modes, None)
+    columns = {"row": columns.pop("row"), "pose": number_column(choice.rank + 1)} | columns
+    columns |= {f"passes_{name}": number_column(passed) for name, passed in choice.passes.items()}
+    order = number_column(np.lexsort((choice.rank, modes.row)))
+    write_table(path, {name: c.take(order) for name, c in columns.items()}, modes.platform)

@@ -5,39 +5,37 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from gough.arrow import label_column, number_column
 from gough.checks import Array
-from gough.errors import GoughError
-from gough.files.block import Block, label_column, number_column
-from gough.files.identity import check_same, describe
-from gough.files.names import (
-    DEVIATIONS,
-    EULER,
-    EULER_DEG,
+from gough.columns import (
     LEGS,
-    POSITION,
-    QUATERNION,
     STATUS,
+    Angles,
     check_kept,
     checked,
     leg_columns,
     pose_columns,
+    solution_names,
 )
-from gough.files.placing import INVALID, PLACED, placed, poses_from_columns
+from gough.errors import GoughError
+from gough.files.block import Block
+from gough.files.identity import check_same, describe
+from gough.files.placing import INVALID, PLACED, placed
 from gough.files.report import NAMED, Outcome, Report
 from gough.files.sink import Sink, open_sink
 from gough.files.source import STANDARD, Reading, Source, file_format, open_source
-from gough.fk.status import Solution, Status
-from gough.kinematics import leg_lengths, pose_covariance
+from gough.fk.frame import solution_columns
+from gough.fk.status import Status
+from gough.kinematics import leg_lengths
 from gough.platform import Platform
+from gough.tables import poses_from_columns
 
 Progress = Callable[[Source, Report], None]
-Angles = Literal["deg", "rad"]
 
 SOLVED = tuple(Outcome(s.label, s.text, s.usable) for s in Status)
 
@@ -59,8 +57,9 @@ def solve_file(
     Args:
         legs: .csv or .parquet with columns leg_1 to leg_6, or "-".
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones, the
-            pose, status, residual [platform unit], iterations and, with `leg_noise`, std_x,
-            std_y, std_z [platform unit], std_rx, std_ry, std_rz [rad].
+            pose, status, residual [platform unit], iterations; with `leg_noise` std_x, std_y,
+            std_z [platform unit], std_rx, std_ry, std_rz [rad]; with `certify` the radius of
+            uniqueness [platform unit].
         angles: write Euler angles (Rx Ry Rz) in these units in place of quaternions.
         leg_noise: standard deviation of the readings, in their unit.
         head: how many first rows the report is to hold.
@@ -77,7 +76,7 @@ def solve_file(
         if report.rows == 0:
             solve(platform, platform.home_legs, **solver)  # pyright: ignore[reportArgumentType]
             report.start()
-        solution = solve(platform, readings, **solver)  # pyright: ignore[reportArgumentType]
+        solution = solve(platform, readings, leg_noise=leg_noise, **solver)  # pyright: ignore[reportArgumentType]
         status = solution.status
         report.add(solution.pose, readings, status, solution.residual)
         _name(
@@ -86,11 +85,10 @@ def solve_file(
             status == Status.INVALID_INPUT,
             lambda i: _bad_legs(readings[i]),
         )
-        return solution_columns(platform, solution, angles, leg_noise)
+        return solution_columns(solution, angles)
 
     report = Report(SOLVED, head)
-    names = [*_pose_names(angles), STATUS, "residual", "iterations"]
-    written = names + list(DEVIATIONS) * (leg_noise is not None)
+    written = solution_names(angles, leg_noise is not None, bool(solver.get("certify")))
     tick = _tick(report, progress)
     _run(legs, out, platform, reading, leg_columns, written, step, tick)
     return report
@@ -133,29 +131,6 @@ def inverse_file(
     tick = _tick(report, progress)
     _run(poses, out, platform, reading, pose_columns, [*LEGS, STATUS], step, tick)
     return report
-
-
-def solution_columns(
-    platform: Platform,
-    solution: Solution,
-    angles: Angles | None,
-    leg_noise: float | None,
-) -> dict[str, pa.Array]:
-    """The output columns of solved rows; see `solve_file`."""
-    pose = solution.pose
-    turn = pose.wxyz if angles is None else pose.euler
-    if angles == "deg":
-        turn = np.degrees(turn)
-    values = np.concatenate([pose.position, turn], axis=-1)
-    columns = {name: number_column(values[:, i]) for i, name in enumerate(_pose_names(angles))}
-    columns[STATUS] = _labels(SOLVED, solution.status)
-    columns["residual"] = number_column(solution.residual)
-    columns["iterations"] = number_column(solution.iterations)
-    if leg_noise is not None:
-        covariance = pose_covariance(platform, pose, leg_noise)
-        deviations = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-        columns |= {name: number_column(deviations[:, i]) for i, name in enumerate(DEVIATIONS)}
-    return columns
 
 
 def _run(
@@ -221,12 +196,6 @@ def _check_paths(path: str | Path, out: str | Path | None) -> None:
             raise GoughError(
                 f"{out}: is the input itself, which would be lost; write to another name"
             )
-
-
-def _pose_names(angles: Angles | None) -> tuple[str, ...]:
-    if angles not in (None, "deg", "rad"):
-        raise GoughError(f"angles: expected 'deg' or 'rad', found {angles!r}")
-    return POSITION + {None: QUATERNION, "deg": EULER_DEG, "rad": EULER}[angles]
 
 
 def _labels(outcomes: Sequence[Outcome], status: NDArray[np.uint8]) -> pa.Array:

@@ -8,8 +8,9 @@ from typing import BinaryIO
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from gough.arrow import check_number, to_float
 from gough.errors import InputError
-from gough.files.block import Block, to_float
+from gough.files.block import Block
 
 PAGE_BUFFER = 1 << 20  # bytes read ahead in each column
 
@@ -92,22 +93,9 @@ class ParquetSource:
 
     def _check_number(self, name: str) -> None:
         kind = self._schema.field(name).type
-        if pa.types.is_dictionary(kind):
-            kind = kind.value_type
-        tests = (
-            pa.types.is_integer,
-            pa.types.is_floating,
-            pa.types.is_decimal,
-            pa.types.is_null,
-        )
-        if any(test(kind) for test in tests):
-            return
         first = self._next(self._file.iter_batches(batch_size=1, columns=[name]))
-        found = f"{first.column(0)[0].as_py()!r:.60}" if first is not None else "nothing"
-        raise InputError(
-            f"{self.where}: column {name}: holds {kind}, expected numbers; row 1 has {found}; "
-            "convert the column to float64"
-        )
+        value = first.column(0)[0].as_py() if first is not None and len(first) else None
+        check_number(self.where, name, kind, value)
 
 
 def _not_parquet(file: BinaryIO, error: Exception) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,6 +12,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 from gough.errors import GoughError
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # not a Unix
+    fcntl = None
 
 BUFFER = 1 << 20  # bytes
 
@@ -22,7 +28,7 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     It is written as PATH.PID.partial in the same folder, brought to the disk, given the old
     file's permissions (or the usual ones) and renamed. After any error or interruption it is
     removed, and what was at `path` is untouched. Only a process that is killed outright leaves
-    the .partial file behind; it can be deleted.
+    the .partial file behind; the next one to write `path` removes it.
 
     Raises:
         GoughError: the folder or the disk does not allow it.
@@ -32,7 +38,9 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     temporary = target.with_name(f"{target.name}.{os.getpid()}.partial")
     file = None
     try:
+        _remove_left_behind(target)
         file = _open_new(temporary)
+        _hold(file.fileno())
         yield file
         file.flush()
         os.fsync(file.fileno())
@@ -85,6 +93,55 @@ def _open_new(path: Path) -> BinaryIO:
         os.unlink(path)
         handle = os.open(path, flags, 0o666)
     return os.fdopen(handle, "wb", buffering=BUFFER)
+
+
+def _remove_left_behind(target: Path) -> None:
+    """Delete what killed processes left of earlier attempts at the same file.
+
+    Only where both are certain: no process here has the number in the name, and nobody holds
+    the file, be it from another machine or container.
+    """
+    name = re.compile(re.escape(target.name) + r"\.([1-9][0-9]{0,9})\.partial")
+    with os.scandir(target.parent) as entries:
+        left = [(entry.path, found) for entry in entries if (found := name.fullmatch(entry.name))]
+    for path, found in left:
+        with suppress(OSError):  # not ours to open or delete, or gone already
+            if not _is_running(int(found[1])) and _is_free(path):
+                os.unlink(path)
+
+
+def _is_running(process: int) -> bool:
+    """Whether a process of this number may be running here."""
+    if fcntl is None:  # os.kill would end it on Windows
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True
+
+
+def _hold(handle: int) -> None:
+    """Lock a file until it is closed, where the file system can do that."""
+    if fcntl is not None:
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _is_free(path: str) -> bool:
+    """Whether nobody holds a plain file; not on file systems that cannot tell."""
+    if fcntl is None or not stat.S_ISREG(os.lstat(path).st_mode):
+        return False
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(handle)
+    return True
 
 
 def _sync_folder(folder: Path) -> None:

@@ -14,8 +14,8 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
+from gough.columns import STATUS
 from gough.errors import GoughError
-from gough.files.names import STATUS
 from gough.files.replace import replacing, why
 from gough.files.source import STANDARD, file_format
 

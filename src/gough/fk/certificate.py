@@ -25,6 +25,7 @@ assumed of Y, which is inverted without care and judged by its delta.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,7 @@ from gough.fk.lanes import LANES, get_real, larger, magnitude, put_real, root
 from gough.kinematics import equivalent_struts
 from gough.platform import Platform
 from gough.pose import Pose, wxyz_to_matrix
+from gough.tables import Table
 
 UNIT = 2.0**-53
 # Bounds on rounding, in UNITs, derived in docs/modes.md with room to spare:
@@ -66,18 +68,39 @@ class Certificate:
             centre. 0 where nothing is proven.
         error: [platform unit] the true solution is within this, in the same measure; infinite
             where nothing is proven.
+        unit: name of the length unit, a label.
     """
 
     certified: NDArray[np.bool_]
     radius: Array
     error: Array
+    unit: str = ""
+
+    def __getitem__(self, index: Any) -> Certificate:
+        return Certificate(self.certified[index], self.radius[index], self.error[index], self.unit)
+
+    def __repr__(self) -> str:
+        known = self.radius[self.certified]
+        unit = f" [{self.unit}]" if self.unit else ""
+        told = f"; smallest radius {np.min(known):.3g}{unit}" if np.size(known) else ""
+        return f"Certificate({np.sum(self.certified)} of {np.size(self.certified)} certified{told})"
+
+    def _repr_html_(self) -> str:
+        from gough.html import length_head, number, page, rows_of
+
+        def cells(i: tuple[int, ...]) -> list[str]:
+            at = self[i]
+            return ["yes" if at.certified else "no", number(at.radius), number(at.error, ".2g")]
+
+        heads = ["", "certified", length_head("radius", self.unit), length_head("error", self.unit)]
+        return page(repr(self), heads, rows_of(np.shape(self.certified), cells))
 
 
-def certify(platform: Platform, legs: ArrayLike, pose: Pose) -> Certificate:
+def certify(platform: Platform, legs: ArrayLike | Table, pose: Pose) -> Certificate:
     """Prove that each pose is within `error` of a pose with these legs, alone in its `radius`.
 
     Args:
-        legs: readings (..., 6).
+        legs: readings (..., 6), or a table as for `solve`.
         pose: batch (...), the computed solutions.
     """
     base, lengths = equivalent_struts(platform, legs)
@@ -92,7 +115,9 @@ def certify(platform: Platform, legs: ArrayLike, pose: Pose) -> Certificate:
     position = np.broadcast_to(pose.position, (*shape, 3)).reshape(-1, 3)
     wxyz = np.broadcast_to(pose.wxyz, (*shape, 4)).reshape(-1, 4)
     certified, radius, error = _certify(base, platform.moving - pivot, lengths, position, wxyz)
-    return Certificate(certified.reshape(shape), radius.reshape(shape), error.reshape(shape))
+    return Certificate(
+        certified.reshape(shape), radius.reshape(shape), error.reshape(shape), platform.unit
+    )
 
 
 def certify_batch(

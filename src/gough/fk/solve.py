@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gough.checks import Array, as_batch
+from gough.checks import Array
 from gough.fk import bulk, geometry
 from gough.fk.polynomial import Polynomial
 from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed, find_seed
@@ -13,11 +13,12 @@ from gough.fk.status import USABLE, Solution, Status
 from gough.kinematics import pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.tables import Origin, Table, as_readings, origin
 
 
 def solve(
     platform: Platform,
-    legs: ArrayLike,
+    legs: ArrayLike | Table,
     *,
     seed: str | Seed | Pose = "auto",
     tol: float = 1e-12,
@@ -35,8 +36,9 @@ def solve(
     workspace, are then tried one by one with a damped method and from other starts.
 
     Args:
-        legs: readings (..., 6): lengths, length changes [platform unit] or motor angles [rad].
-            Rows that hold NaN or impossible numbers get status INVALID_INPUT.
+        legs: readings (..., 6): lengths, length changes [platform unit] or motor angles [rad];
+            or a pandas, polars, pyarrow or other Arrow table with columns leg_1 to leg_6. Rows
+            that hold NaN, nothing or impossible numbers get status INVALID_INPUT.
         seed: the first guess. "auto" (polynomial where the platform states a workspace, else
             home), "home", "polynomial", "polynomial-5" (another degree), "disgnet" or another
             network that comes with the package, the path of a trained one or of its run's
@@ -58,13 +60,14 @@ def solve(
         workers: threads; all cores unless given.
 
     Returns:
-        Solution: batch axes as those of `legs`.
+        Solution: batch axes as those of `legs`; (N,) for a table.
 
     Raises:
         GoughError: legs of another shape, an option out of range, an unknown seed.
+        InputError: a table without these columns, or with something else than numbers there.
         PlatformError: a polynomial seed for a platform without workspace.
     """
-    readings = as_batch("legs", legs, (6,))
+    readings = as_readings(legs)
     settings = bulk.Settings(tol, max_iterations, restarts, singular, workers)
     flat = np.ascontiguousarray(readings.reshape(-1, 6))
     found = find_seed(platform, seed)
@@ -77,7 +80,7 @@ def solve(
     radius = _certify(platform, flat, rows, settings) if certify else None
     if ambiguous:
         _doubt(platform, flat, rows)
-    return _solution(platform, rows, radius, readings.shape[:-1], leg_noise)
+    return _solution(platform, rows, radius, readings.shape[:-1], leg_noise, origin(legs))
 
 
 def _start(platform: Platform, seed: Seed, legs: Array) -> Array | Polynomial:
@@ -156,6 +159,7 @@ def _solution(
     radius: Array | None,
     batch: tuple[int, ...],
     leg_noise: ArrayLike | None,
+    source: Origin | None,
 ) -> Solution:
     pose = Pose.trusted(rows.position.reshape(*batch, 3), rows.wxyz.reshape(*batch, 4))
     return Solution(
@@ -165,6 +169,8 @@ def _solution(
         rows.iterations.reshape(batch),
         None if leg_noise is None else pose_covariance(platform, pose, leg_noise),
         None if radius is None else radius.reshape(batch),
+        platform.unit,
+        source,
     )
 
 

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.columns import Angles
 from gough.pose import Pose
+from gough.tables import Kind, Origin, Table, make_frame
 
 
 class Status(IntEnum):
@@ -97,6 +99,8 @@ class Solution:
         covariance: (..., 6, 6) pose covariance, see `gough.pose_covariance`, or None.
         radius: (...) radius of uniqueness [platform unit], see `gough.Certificate`, 0 where
             nothing is proven; None unless certificates were asked for.
+        unit: name of the platform's length unit, a label.
+        origin: the table that the readings came in, if they did; see `to_frame`.
     """
 
     pose: Pose
@@ -105,6 +109,8 @@ class Solution:
     iterations: NDArray[np.int32]
     covariance: Array | None = None
     radius: Array | None = None
+    unit: str = ""
+    origin: Origin | None = None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -123,8 +129,28 @@ class Solution:
         radius = None if self.radius is None else self.radius[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
-            covariance, radius,
+            covariance, radius, self.unit, self.origin and self.origin.at(index),
         )  # fmt: skip
+
+    def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
+        """A table with a row for each pose, in order: the columns that `gough solve` writes.
+
+        x, y, z [platform unit], qw, qx, qy, qz, status (a word), residual [platform unit],
+        iterations; with a covariance the standard deviations std_x, std_y, std_z [platform
+        unit], std_rx, std_ry, std_rz [rad]; with certificates radius [platform unit].
+
+        Args:
+            kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
+                else pandas. A pandas table has the row labels of that of the readings.
+            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz), in
+                place of the quaternion.
+
+        Raises:
+            GoughError: another kind or angle, or a library that is not installed.
+        """
+        from gough.fk.frame import solution_columns
+
+        return make_frame(solution_columns(self, angles), kind, self.origin)
 
     def __repr__(self) -> str:
         if not self.pose.batch:
@@ -134,3 +160,23 @@ class Solution:
             )
         found = ", ".join(f"{s.label}: {n}" for s, n in self.counts().items())
         return f"Solution(batch {self.pose.batch}; {found})"
+
+    def _repr_html_(self) -> str:
+        from gough.html import length_head, number, page, pose_cells, pose_heads, rows_of
+
+        def cells(i: tuple[int, ...]) -> list[str]:
+            at = self[i] if i else self
+            radius = [] if at.radius is None else [number(at.radius, ".3g")]
+            last = [number(at.residual, ".2g"), str(int(at.iterations))]
+            return [*pose_cells(at.pose), Status(int(at.status)).label, *last, *radius]
+
+        heads = [*pose_heads(self.pose.batch, self.unit), "status"]
+        heads += [length_head("residual", self.unit), "iterations"]
+        heads += [] if self.radius is None else [length_head("radius", self.unit)]
+        notes = []
+        for status, times in self.counts().items():
+            first = np.argwhere(np.asarray(self.status) == status)[0].tolist()
+            where = f", first in row {', '.join(map(str, first))}" if first else ""
+            notes.append(f"{times:,} {status.label}{where}: {status.text}")
+        rows = rows_of(self.pose.batch, cells)
+        return page(f"Solution of {np.size(self.status):,}", heads, rows, notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from enum import IntEnum
 
 import numpy as np
@@ -16,6 +17,9 @@ from gough.fk.track_kernel import BAD_READING, CROSSED, FAILED, STATE, cycle
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.tables import Table, as_readings, is_arrow
+
+PLAIN = (np.ndarray, list, tuple)  # readings without names, told apart quickly
 
 
 class Event(IntEnum):
@@ -124,18 +128,22 @@ class Tracker:
         """What is known about the last reading."""
         return Status(self._code)
 
-    def update(self, legs: ArrayLike) -> Pose:
+    def update(self, legs: ArrayLike | Table) -> Pose:
         """The pose at the next reading (6,); `status` and `event` tell how far to trust it.
+
+        A row of a pandas table is a reading, too: it is read by its labels, leg_1 to leg_6.
 
         Raises:
             GoughError: not six numbers. A reading that is NaN or impossible raises nothing.
         """
+        if type(legs) not in PLAIN and is_arrow(legs):
+            legs = as_readings(legs)
         try:
             if len(legs) != 6:  # type: ignore[arg-type]
                 raise GoughError(f"legs: expected (6,), got {np.shape(legs)}")
             self._legs[0] = legs
         except (TypeError, ValueError) as error:
-            raise GoughError(f"legs: expected six numbers, found {legs!r}") from error
+            raise GoughError(f"legs: expected six numbers, found {reprlib.repr(legs)}") from error
         code = FAILED if self._lost else self._run()
         if code >= layout.OPEN:
             self._doubt(code)
@@ -144,6 +152,18 @@ class Tracker:
             if self._missed:
                 self._forget()
         return self.pose
+
+    def __repr__(self) -> str:
+        told = f"{self.event.name.lower()}, {self.status.label}"
+        return f"Tracker({self.platform.name!r}, {told}, {self.pose!r})"
+
+    def _repr_html_(self) -> str:
+        from gough.html import page, pose_cells, pose_heads
+
+        heads = [*pose_heads((), self.platform.unit), "event", "status"]
+        cells = ["", *pose_cells(self.pose), self.event.name.lower(), self.status.label]
+        notes = [self.event.text] + [self.status.text] * (self.event != Event.FOLLOWED)
+        return page(f"Tracker of {self.platform.name}", heads, [cells], notes)
 
     # ---- a cycle that went well -------------------------------------------------------
 

@@ -8,10 +8,10 @@ before it, written as one more metadata entry, so that it stays a plain ONNX fil
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import logging
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +62,7 @@ def to_onnx(model: PoseNetwork, facts: dict) -> bytes:
         program = torch.onnx.export(
             _Raw(model).eval(), (legs,), dynamo=True, external_data=False, opset_version=18,
             input_names=["legs"], output_names=["raw"],
-            dynamic_shapes=({0: torch.export.Dim("rows", min=1)},),
+            dynamic_shapes=({0: torch.export.Dim("rows", min=1)},), verbose=False,
         )  # fmt: skip
     assert program is not None
     proto = program.model_proto
@@ -113,14 +113,26 @@ class _Raw(nn.Module):
         return self.model.raw(legs)
 
 
+# What the exporter says of itself at every export, and what no user can do anything about
+REMARKS = {
+    "torch.onnx._internal.exporter._registration": "torchvision is not installed. Skipping ",
+    "onnxscript.optimizer._constant_folding": "Skipping constant folding for op ",
+}
+
+
 @contextlib.contextmanager
-def _quiet():
-    """Without the exporter's remarks, which are meant for its developers."""
-    level = logging.getLogger().level
-    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
-        warnings.simplefilter("ignore")
-        logging.getLogger().setLevel(logging.ERROR)
-        try:
+def _quiet() -> Iterator[None]:
+    """Without these remarks; all other warnings pass."""
+    drop = [
+        (logging.getLogger(name), lambda record, start=start: not record.msg.startswith(start))
+        for name, start in REMARKS.items()
+    ]
+    for logger, rule in drop:
+        logger.addFilter(rule)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*treespec, LeafSpec.*deprecated", FutureWarning)
             yield
-        finally:
-            logging.getLogger().setLevel(level)
+    finally:
+        for logger, rule in drop:
+            logger.removeFilter(rule)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough.checks import Array, as_batch
+from gough.checks import Array
 from gough.fk.bulk import cores
 from gough.fk.certificate import certify
 from gough.kinematics import equivalent_struts
@@ -21,6 +21,7 @@ from gough.modes.starts import SEED, Start, start_of
 from gough.modes.study import distinct
 from gough.modes.tracker import FINITE, LOST
 from gough.platform import Platform
+from gough.tables import Origin, Table, as_readings, origin
 
 CHUNK = 128  # sets of readings per task
 # What readings whose paths do not all arrive apart are tried with: the share of the radius of
@@ -31,7 +32,7 @@ TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the 
 
 
 def assembly_modes(
-    platform: Platform, legs: ArrayLike, *, threads: int | None = None
+    platform: Platform, legs: ArrayLike | Table, *, threads: int | None = None
 ) -> AssemblyModes:
     """All real poses for leg readings, each with a certificate, and whether the list is complete.
 
@@ -40,14 +41,14 @@ def assembly_modes(
     bits, whatever the number of threads and whatever other readings are beside.
 
     Args:
-        legs: readings (6,) or (N, 6) of any kind of leg.
+        legs: readings (6,) or (N, 6) of any kind of leg, or a table as for `solve`.
         threads: at most so many; all the process may use if None.
 
     Raises:
         GoughError: legs of another shape, or not numbers. Rows with NaN or infinity are
             answered with no poses and the status INVALID_INPUT.
     """
-    readings = as_batch("legs", legs, (6,))
+    readings = as_readings(legs)
     rows = readings.reshape(-1, 6)
     start = start_of(platform)
     base, lengths = equivalent_struts(platform, rows)
@@ -60,7 +61,7 @@ def assembly_modes(
         _curves(platform, work, todo, outcome)
     else:
         _run(work, todo, outcome, threads)
-    return _assemble(platform, readings, start, outcome)
+    return _assemble(platform, readings, start, outcome, origin(legs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +244,9 @@ def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _
         outcome.status[row] = ModesStatus.ALWAYS_SINGULAR
 
 
-def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) -> AssemblyModes:
+def _assemble(
+    platform: Platform, legs: Array, start: Start, outcome: _Outcome, source: Origin | None
+) -> AssemblyModes:
     """Poses in the platform's coordinates, certified, nearest to home first in each row."""
     row, e, t, multiple = (np.concatenate(parts) for parts in zip(*outcome.blocks, strict=True))
     pose = start.frames.pose(e, t)
@@ -257,6 +260,7 @@ def _assemble(platform: Platform, legs: Array, start: Start, outcome: _Outcome) 
         platform=platform, legs=legs, pose=pose, row=row, multiplicity=multiple,
         certificate=proof, status=outcome.status.reshape(legs.shape[:-1]),
         paths=outcome.paths.reshape(*legs.shape[:-1], 4), solutions=start.count,
+        origin=source,
     )  # fmt: skip
 
 

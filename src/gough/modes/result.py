@@ -6,11 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.columns import RADIUS, RESIDUAL, STATUS, Angles
 from gough.fk.certificate import Certificate
 from gough.kinematics import (
     assembly_sign,
@@ -20,6 +22,10 @@ from gough.kinematics import (
 )
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.tables import Kind, Origin, Table, make_frame, pose_table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 
 class ModesStatus(IntEnum):
@@ -88,6 +94,7 @@ class AssemblyModes:
         paths: (4,) or (N, 4): how many of the complex solutions are real, are complex, went
             to infinity, met in singular ones.
         solutions: complex solutions that this machine has for general readings.
+        origin: the table that the readings came in, if they did; see `to_frame`.
     """
 
     platform: Platform
@@ -99,6 +106,7 @@ class AssemblyModes:
     status: NDArray[np.uint8]
     paths: NDArray[np.int32]
     solutions: int
+    origin: Origin | None = None
 
     @cached_property
     def residual(self) -> Array:
@@ -151,15 +159,80 @@ class AssemblyModes:
         return replace(
             self, legs=self.legs[index], pose=self.pose[mine], row=np.zeros(mine.sum(), int),
             multiplicity=self.multiplicity[mine], status=self.status[index],
-            certificate=Certificate(proof.certified[mine], proof.radius[mine], proof.error[mine]),
+            certificate=proof[mine],
             paths=self.paths[index],
+            origin=self.origin and self.origin.at(np.full(mine.sum(), index)),
         )  # fmt: skip
 
     def __iter__(self) -> Iterator[AssemblyModes]:
         return (self[k] for k in range(len(self)))
+
+    def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
+        """A table with a row for each of the M poses, set after set, nearest to home first.
+
+        row (the set of readings, from 0), x, y, z [platform unit], qw, qx, qy, qz, status (a
+        word), residual [platform unit], multiplicity, certified, radius, error [platform unit],
+        sigma_min (see `singularity_distance`), sign.
+
+        Args:
+            kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
+                else pandas. A pandas table has the row labels of that of the readings, each as
+                often as its readings have poses.
+            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz), in
+                place of the quaternion.
+
+        Raises:
+            GoughError: another kind or angle, or a library that is not installed.
+        """
+        source = self.origin
+        if source is not None and self.legs.ndim > 1:
+            source = source.at(self.row)
+        return make_frame(mode_columns(self, angles), kind, source)
 
     def __repr__(self) -> str:
         if self.legs.ndim == 1:
             label = ModesStatus(int(self.status)).label
             return f"AssemblyModes({len(self.row)} poses, {label})"
         return f"AssemblyModes({len(self.row)} poses of {len(self.legs)} sets of readings)"
+
+    def _repr_html_(self) -> str:
+        from gough.html import length_head, number, page, pose_cells, pose_heads, rows_of
+
+        def cells(i: tuple[int, ...]) -> list[str]:
+            k = i[0]
+            one = self.certificate[k]
+            proof = number(one.radius) if one.certified else "not proven"
+            told = [number(self.residual[k], ".2g"), proof, number(self.singularity_distance[k])]
+            return [*([str(self.row[k])] if several else []), *pose_cells(self.pose[k]), *told]
+
+        several, unit = self.legs.ndim > 1, self.platform.unit
+        first, *heads = pose_heads((len(self.row),), unit)
+        heads = [first, *(["set"] if several else []), *heads, length_head("residual", unit)]
+        heads += [length_head("radius", unit), "to singularity"]
+        codes, times = np.unique(self.status, return_counts=True)
+        notes = [
+            f"{n:,} {ModesStatus(s).label}: {ModesStatus(s).text}"
+            for s, n in zip(codes.tolist(), times.tolist(), strict=True)
+        ]
+        title = f"{self!r} of {self.platform.name}"
+        return page(title, heads, rows_of((len(self.row),), cells), notes)
+
+
+def mode_columns(modes: AssemblyModes, angles: Angles | None) -> dict[str, pa.Array]:
+    """The columns of `AssemblyModes.to_frame`."""
+    from gough.arrow import label_column, number_column
+
+    labels = [status.label for status in ModesStatus]
+    proof = modes.certificate
+    return {
+        "row": number_column(modes.row),
+        **pose_table(modes.pose, angles),
+        STATUS: label_column(np.ravel(modes.status)[modes.row], labels),
+        RESIDUAL: number_column(modes.residual),
+        "multiplicity": number_column(modes.multiplicity),
+        "certified": number_column(modes.certified),
+        RADIUS: number_column(proof.radius),
+        "error": number_column(proof.error),
+        "sigma_min": number_column(modes.singularity_distance),
+        "sign": number_column(modes.sign),
+    }

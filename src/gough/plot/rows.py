@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.columns import LEGS, STATUS, checked, leg_columns, pose_columns
 from gough.errors import InputError
 from gough.files.block import Block
 from gough.files.identity import check_same
-from gough.files.names import LEGS, STATUS, checked, leg_columns, pose_columns
-from gough.files.placing import poses_from_columns
 from gough.files.source import Reading, Source, open_source
 from gough.fk.solve import solve
 from gough.fk.status import Status
@@ -24,6 +23,7 @@ from gough.plot.envelope import Envelope
 from gough.plot.histograms import LogHistogram
 from gough.plot.trajectory import SIGNALS, signals
 from gough.pose import Pose
+from gough.tables import poses_from_columns
 
 RESIDUAL = "residual"
 UNUSABLE = tuple(s.label for s in Status if not s.usable)

@@ -1,10 +1,11 @@
-"""Names of the columns, and which of a file's columns are meant."""
+"""Names of the columns of files and tables, and which of those found are meant."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
-from gough.errors import InputError, suggestion
+from gough.errors import GoughError, InputError, suggestion
 
 LEGS = tuple(f"leg_{i}" for i in range(1, 7))
 POSITION = ("x", "y", "z")
@@ -12,8 +13,9 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 EULER = ("rx", "ry", "rz")  # [rad], R = Rx Ry Rz
 EULER_DEG = ("rx_deg", "ry_deg", "rz_deg")
 ROTATIONS = (QUATERNION, EULER, EULER_DEG)
+STATUS, RESIDUAL, ITERATIONS, RADIUS = "status", "residual", "iterations", "radius"
 DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
-STATUS = "status"
+Angles = Literal["deg", "rad"]
 
 
 def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
@@ -26,7 +28,8 @@ def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     if missing:
         some = f"no column {', '.join(missing)}" if len(missing) < 6 else "no leg columns"
         raise InputError(
-            f"{where}: {some}; expected leg_1 to leg_6, found {_list(found)}; rename the columns"
+            f"{where}: {some}; expected leg_1 to leg_6, found {_list(found)}; "
+            f"{_rename(missing, found)}"
         )
     return checked(where, found, LEGS)
 
@@ -43,9 +46,26 @@ def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
         what = f"column {', '.join(missing)}" if missing else "whole set of rotation columns"
         raise InputError(
             f"{where}: no {what}; expected x, y, z and one of qw, qx, qy, qz | rx, ry, rz [rad] | "
-            f"rx_deg, ry_deg, rz_deg; found {_list(found)}; rename the columns"
+            f"rx_deg, ry_deg, rz_deg; found {_list(found)}; {_rename(missing, found)}"
         )
     return checked(where, found, (*POSITION, *rotation))
+
+
+def pose_names(angles: Angles | None) -> tuple[str, ...]:
+    """The columns that a pose is written to: with Euler angles in these units, or a quaternion.
+
+    Raises:
+        GoughError: angles of another name.
+    """
+    if angles not in (None, "deg", "rad"):
+        raise GoughError(f"angles: expected 'deg' or 'rad', found {angles!r}")
+    return POSITION + {None: QUATERNION, "deg": EULER_DEG, "rad": EULER}[angles]
+
+
+def solution_names(angles: Angles | None, covariance: bool, radius: bool) -> tuple[str, ...]:
+    """The columns that solved rows are written to."""
+    optional = DEVIATIONS * covariance + (RADIUS,) * radius
+    return (*pose_names(angles), STATUS, RESIDUAL, ITERATIONS, *optional)
 
 
 def checked(where: str, found: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
@@ -74,6 +94,19 @@ def check_kept(keep: Sequence[str], written: Sequence[str]) -> None:
             raise InputError(
                 f"--keep {name}: the output has a column of that name already; rename yours"
             )
+
+
+def _rename(missing: Sequence[str], found: Sequence[str]) -> str:
+    """What to do about missing columns; names the one most like the first of them, if any is."""
+    from difflib import get_close_matches
+
+    known = {name for names in (LEGS, POSITION, *ROTATIONS) for name in names}
+    others = {name.strip().lower(): name for name in reversed(found) if name not in known}
+    for name in missing:
+        near = get_close_matches(name, others, n=1, cutoff=0.7)
+        if near:
+            return f"rename the columns (is {others[near[0]]!r} meant as {name}?)"
+    return "rename the columns"
 
 
 def _list(names: Sequence[str]) -> str:

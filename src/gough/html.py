@@ -1,0 +1,95 @@
+"""What notebooks show in place of a repr: a small table, with units and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from html import escape
+from itertools import chain
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from gough.platform import Platform
+    from gough.pose import Pose
+
+SHOWN = 5  # rows at the start and at the end of a batch
+
+
+def page(
+    title: str, heads: Iterable[str], rows: Iterable[Iterable[str]], notes: Iterable[str] = ()
+) -> str:
+    """A table below a title and above notes; all of them plain text.
+
+    No colours: the notebook's own theme, light or dark, gives them.
+    """
+    head = "".join(f"<th style='text-align:right'>{escape(text)}</th>" for text in heads)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
+    below = "".join(f"<div>{escape(text)}</div>" for text in notes)
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return f"<div><strong>{escape(title)}</strong>{table}{below}</div>"
+
+
+def rows_of(batch: tuple[int, ...], cells: Callable[[tuple[int, ...]], list[str]]) -> Iterator:
+    """Index and cells of the first and the last rows of a batch; of the only one of none."""
+    count = int(np.prod(batch))
+    cut = count > 2 * SHOWN + 1
+    for k in chain(range(SHOWN), range(count - SHOWN, count)) if cut else range(count):
+        index = tuple(map(int, np.unravel_index(k, batch)))
+        row = [", ".join(map(str, index)), *cells(index)]
+        if cut and k == count - SHOWN:
+            yield ["⋮"] * len(row)
+        yield row
+
+
+def pose_heads(batch: tuple[int, ...], unit: str) -> list[str]:
+    """What stands above the index and `pose_cells`."""
+    return ["row" if batch else "", *(length_head(axis, unit) for axis in "xyz"), *TURNS]
+
+
+TURNS = ("rx [deg]", "ry [deg]", "rz [deg]")
+
+
+def pose_cells(pose: Pose) -> list[str]:
+    """Position and Euler angles, R = Rx Ry Rz, in degrees."""
+    return [number(v, ".7g") for v in pose.position] + [
+        number(v, ".4f") for v in np.degrees(pose.euler)
+    ]
+
+
+def platform_notes(platform: Platform) -> list[str]:
+    """Home, pivot and workspace of a platform, a sentence each."""
+    unit = platform.unit or "unit not named"
+    turn = vector(np.degrees(platform.home.euler))
+    notes = [f"home: {vector(platform.home.position)} [{unit}], turned by {turn} [deg]"]
+    if platform.pivot is not None:
+        notes.append(f"pivot: {vector(platform.pivot)} [{unit}]")
+    if platform.workspace is not None:
+        box = platform.workspace
+        sides = [(axis, side, unit) for axis, side in zip("xyz", box.translation, strict=True)]
+        turns = zip(("rx", "ry", "rz"), box.rotation_deg, strict=True)
+        sides += [(axis, side, "deg") for axis, side in turns]
+        told = "; ".join(f"{axis} {vector(side, ' to ')} [{u}]" for axis, side, u in sides)
+        notes.append(f"workspace from home: {told}")
+    return notes
+
+
+def length_head(name: str, unit: str) -> str:
+    """The head of a column of lengths."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def number(value: ArrayLike, digits: str = ".4g") -> str:
+    """A number without a minus before zero; a dash where there is none."""
+    real = float(np.asarray(value))
+    return "–" if np.isnan(real) else f"{real:z{digits}}"
+
+
+def vector(values: ArrayLike, between: str = ", ") -> str:
+    """Numbers side by side."""
+    return between.join(number(v, ".6g") for v in np.ravel(values))
+
+
+def _cell(text: str) -> str:
+    return f"<td style='text-align:right;white-space:nowrap'>{escape(text)}</td>"
