@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 pytest.importorskip("matplotlib")
 
 import gough
-from gough.files.names import LEGS
+from gough.columns import LEGS
 from gough.files.source import Reading
 from gough.plot import Envelope, trajectory_figure
 from gough.plot.rows import read_pose, read_trajectory

@@ -33,7 +33,7 @@ def run(
     budget: Annotated[str | None, arg(metavar="TIME", help_behavior_hint="")] = None,
     stage: Annotated[
         UseAppendAction[tuple[Stage, ...]],
-        arg(metavar="STAGE", help_behavior_hint=""),
+        arg(metavar="STAGE...", help_behavior_hint=""),
     ] = (),
     resume: bool = False,
 ) -> int:
@@ -45,8 +45,9 @@ def run(
 
     gough paper -o FOLDER --stage sets
 
-    In full it trains 24 networks, five minutes each on one thread. The folder gets index.md,
-    report.html, figures/, results/ and networks/; runs/ is only needed to go on training.
+    In full it trains 24 networks, five minutes each on one thread.
+
+    The folder gets index.md, report.html, figures, results and networks.
 
     Args:
         quick: everything at small scale, in about two minutes.
