@@ -1,0 +1,98 @@
+"""Sketches of what the formulas say: the leg, its rate of change, the certificate's parabola."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, arrow, figure, label, sketch
+
+
+def leg_equation() -> Figure:
+    """Left the vectors of one leg, right how a small motion of the platform changes it."""
+    whole = figure(8.4, 3.6)
+    left, right = whole.subplots(1, 2)
+    _vectors(left)
+    _rate(right)
+    return whole
+
+
+def _vectors(axes: Axes) -> None:
+    sketch(axes)
+    origin, foot = np.array([0.0, 0.0]), np.array([1.9, 0.25])
+    centre, head = np.array([0.35, 2.6]), np.array([1.25, 3.1])
+    _plates(axes, foot, centre, head)
+    arrow(axes, origin, foot, BLACK)
+    arrow(axes, origin, centre, VERMILION)
+    arrow(axes, centre, head, BLUE)
+    arrow(axes, foot, head, GREEN, 2.2)
+    label(axes, (0.95, -0.08), "$b_i$", BLACK, 12)
+    label(axes, (-0.02, 1.45), "$t$", VERMILION, 12)
+    label(axes, (0.68, 3.08), "$R\\,p_i$", BLUE, 12)
+    label(axes, (1.85, 1.75), "$d_i$", GREEN, 12)
+    label(axes, (0.1, -0.5), "base coordinates", GREY, 8)
+    label(axes, (-0.55, 2.75), "platform", GREY, 8)
+    axes.set_title("$d_i = R\\,p_i + t - b_i$", pad=10)
+    axes.set(xlim=(-1.3, 2.9), ylim=(-0.9, 3.9))
+
+
+def _rate(axes: Axes) -> None:
+    sketch(axes)
+    foot = np.array([1.9, 0.25])
+    centre, head = np.array([0.35, 2.6]), np.array([1.25, 3.1])
+    _plates(axes, foot, centre, head)
+    axes.plot(*np.transpose([foot, head]), color=GREEN, linewidth=2.2)
+    along = (head - foot) / np.linalg.norm(head - foot)
+    motion = np.array([0.62, 0.5])
+    arrow(axes, centre, head, BLUE)
+    label(axes, (0.68, 3.1), "$r_i$", BLUE, 12)
+    arrow(axes, head, head + motion, VERMILION, 1.8)
+    label(axes, head + motion + (0.45, 0.12), "$v + \\omega \\times r_i$", VERMILION, 11)
+    gained = (motion @ along) * along
+    arrow(axes, head, head + gained, ORANGE, 1.8)
+    axes.plot(*np.transpose([head + motion, head + gained]), ":", color=GREY, linewidth=1)
+    label(axes, head + gained + (-0.3, 0.2), "$\\dot l_i$", ORANGE, 12)
+    arrow(axes, foot, foot + 0.8 * along, BLACK, 1.6)
+    label(axes, foot + 0.55 * along + (0.35, 0), "$n_i$", BLACK, 12)
+    axes.set_title("$\\dot l_i = n_i \\cdot v + (r_i \\times n_i) \\cdot \\omega$", pad=10)
+    axes.set(xlim=(-1.3, 2.9), ylim=(-0.9, 3.9))
+
+
+def _plates(axes: Axes, foot, centre, head) -> None:
+    """Base and platform as bars with their joints."""
+    axes.plot([-1.1, 2.5], [-0.02, 0.33], color="#d0d0d0", linewidth=7, solid_capstyle="round")
+    across = (head - centre) / np.linalg.norm(head - centre)
+    bar = centre + across * np.array([[-1.1], [1.25]])
+    axes.plot(*bar.T, color="#cfe3f1", linewidth=7, solid_capstyle="round")
+    axes.plot(*foot, "o", color=BLACK, markersize=7, zorder=5)
+    axes.plot(*head, "o", color=BLUE, markersize=7, zorder=5)
+    axes.plot(*centre, "o", color=VERMILION, markersize=4, zorder=5)
+    axes.plot(0, 0, "o", color=VERMILION, markersize=4, zorder=5)
+
+
+def certificate() -> Figure:
+    """Where a ball of radius rho lands, against rho: below the diagonal it maps into itself."""
+    whole = figure(5.4, 3.5)
+    axes = whole.subplots()
+    beta, delta, kappa = 0.06, 0.12, 0.85
+    rho = np.linspace(0, 1.05, 300)
+    root = np.sqrt((1 - delta) ** 2 - 4 * kappa * beta)
+    near, far = 2 * beta / (1 - delta + root), (1 - delta) / (2 * kappa)
+    axes.axvspan(near, far, color=BLUE, alpha=0.12, linewidth=0)
+    axes.plot(rho, rho, color=GREY, linewidth=1)
+    axes.plot(rho, beta + delta * rho + kappa * rho**2, color=BLUE, linewidth=2)
+    for x, name in ((near, "$\\rho_-$\nthe solution\nis within this"),
+                    (far, "$\\rho_+$\nno other\nwithin this")):  # fmt: skip
+        axes.plot([x, x], [0, 1], color=VERMILION, linewidth=1, linestyle="--")
+        axes.text(x + 0.012, 0.98, name, color=VERMILION, va="top", fontsize=9)
+    axes.text(0.93, 0.9, "$\\rho$", color=GREY, ha="right")
+    axes.text(0.79, 0.52, "$\\beta + \\delta\\rho + \\kappa\\rho^2$", color=BLUE)
+    axes.plot(0, beta, "o", color=BLUE)
+    axes.text(0.015, beta - 0.01, "$\\beta$", color=BLUE, va="top")
+    axes.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
+    axes.set_xlabel("radius $\\rho$ of a ball about the computed pose")
+    axes.set_ylabel("radius of its image")
+    return whole
+
+
+FIGURES = {"leg_equation": leg_equation, "certificate": certificate}

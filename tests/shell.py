@@ -1,0 +1,86 @@
+"""Commands of a page: `gough` in this process, where it need not start anew, the rest by bash."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from unittest import mock
+
+from gough import cli
+
+WIDTH = "80"
+# printed by whichever command of a test run happens to be the first
+COMPILED = re.compile(r"^\(before that \d+ s to compile the solver, once\)\n", re.MULTILINE)
+
+
+def run(command: str, last: int = 0) -> tuple[str, int]:
+    """What a command prints on both outputs, and its exit code.
+
+    Args:
+        last: exit code of the command before it, which `echo $?` prints.
+    """
+    if command.strip() == "echo $?":
+        return f"{last}\n", 0
+    words = _words(command)
+    target = words[-1] if words[-2:-1] == [">"] else None
+    plain = words[:-2] if target else words
+    if plain[:1] == ["gough"] and not {"-", "|", "&&", ";", "<", ">", ">>"} & set(plain):
+        return _here(plain[1:], target)
+    return _bash(command)
+
+
+def _words(command: str) -> list[str]:
+    lexer = shlex.shlex(command.replace("\\\n", " "), posix=True, punctuation_chars="|&;<>")
+    lexer.whitespace_split = True
+    return list(lexer)
+
+
+def _here(arguments: list[str], target: str | None) -> tuple[str, int]:
+    out = io.StringIO()
+    told = io.StringIO() if target else out
+    with (
+        mock.patch.object(cli.stopping, "listen"),  # signals belong to the tests
+        mock.patch.object(cli.stopping, "ignore"),
+        mock.patch.dict(os.environ, {"COLUMNS": WIDTH}),
+        contextlib.redirect_stdout(told),
+        contextlib.redirect_stderr(out),
+    ):
+        try:
+            cli.main(arguments)
+        except SystemExit as end:
+            code = int(end.code or 0)
+    if target:
+        Path(target).write_text(told.getvalue(), "utf-8")
+    return COMPILED.sub("", out.getvalue()), code
+
+
+def _bash(command: str) -> tuple[str, int]:
+    """By bash, with a `gough` that is the one under test, whether or not it is installed."""
+    with tempfile.TemporaryDirectory() as folder:
+        script = Path(folder, "gough")
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m gough.cli "$@"\n', "utf-8")
+        script.chmod(0o755)
+        sources = str(Path(cli.__file__).parents[1])
+        done = subprocess.run(
+            ["bash", "-c", "set -o pipefail; " + command],
+            check=False,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ
+            | {
+                "COLUMNS": WIDTH,
+                "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}",
+                "PYTHONPATH": os.pathsep.join(
+                    filter(None, [sources, os.environ.get("PYTHONPATH")])
+                ),
+            },
+        )
+    return COMPILED.sub("", done.stdout), done.returncode
