@@ -2,7 +2,7 @@
 
 In the Study parameters (1, r; g0, c) relative to the computed pose, about the centre of the
 platform joints, the legs' equations and the Study quadric g0 + r.c = 0 are quadratic with
-constant coefficients (docs/modes.md). Write x = (2 g, 2 L r), L the joints' root mean square
+constant coefficients (docs/proofs.md). Write x = (2 g, 2 L r), L the joints' root mean square
 distance from their centre, so that x is a length: 2 g the shift, 2 L r the turn. Half the
 equation of leg i is
 
@@ -39,7 +39,7 @@ from gough.pose import Pose, wxyz_to_matrix
 from gough.tables import Table
 
 UNIT = 2.0**-53
-# Bounds on rounding, in UNITs, derived in docs/modes.md with room to spare:
+# Bounds on rounding, in UNITs, derived in docs/proofs.md with room to spare:
 STRUT = 96.0  # error of a computed strut over the sum of the lengths it is made of
 SQUARE = 8.0  # further error of d.d - l^2 over d.d + l^2
 SLACK = 1.0 + 1e-9  # for the arithmetic of the bounds themselves

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gough.modes.study import Complex
 from gough.modes.tracker import FINITE, track
 
-SHARE = 0.4  # of the series' radius of convergence per step: fewest passes, see docs/modes.md
+SHARE = 0.4  # of the series' radius of convergence per step: fewest passes, see docs/proofs.md
 
 
 @dataclass(frozen=True, eq=False)

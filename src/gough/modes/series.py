@@ -4,7 +4,7 @@ A pose is a quaternion e and a position t, here both complex, with R(e) = Q(e) /
 near one are written relative to it in Study parameters (1, r; g0, c) with g0 = -r.c: a turn
 with tan(angle / 2) = |r| about the platform's origin, and a shift by 2 c to first order. With
 q = R p the arm of a leg, b its base joint seen from the platform's origin, d = q - b the strut
-and m = q + b, the leg's equation times 1 + r.r is exactly (docs/modes.md derives it)
+and m = q + b, the leg's equation times 1 + r.r is exactly (docs/proofs.md derives it)
 
     f + 4 (c.d + r.(q x d))                                             f = d.d - l^2
       + 4 (g0 g0 + c.c) + 4 m.(c x r) - 4 g0 r.d
