@@ -1,6 +1,9 @@
 """Sphinx settings: MyST pages, the API from docstrings, warnings are errors (`make docs`)."""
 
+import re
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 from gough import __version__
 
@@ -9,7 +12,16 @@ author = "the gough authors"
 copyright = "the gough authors, Apache-2.0"
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+sys.path.insert(0, str(Path(__file__).parent))  # for mathml
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "mathml",
+]
+html_math_renderer = "mathml"
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
@@ -32,3 +44,18 @@ autodoc_mock_imports = [
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+
+
+def name_every_page(app, page, source):
+    """Add a last group to the index, of the pages that none of its own groups names."""
+    if page != "index":
+        return
+    named = set(re.findall(r"^[\w/]+$", source[0], re.MULTILINE))
+    others = sorted(app.env.found_docs - named - {"index"})
+    if others:
+        entries = "\n".join(others)
+        source[0] += f"\n```{{toctree}}\n:caption: More\n:hidden:\n\n{entries}\n```\n"
+
+
+def setup(app):
+    app.connect("source-read", name_every_page)

@@ -28,8 +28,8 @@ PLATE_DEG = np.array([-52, 52, 68, 172, 188, 292])
 
 def drawing() -> Figure:
     """Plan, elevation and a strut, with dimensions."""
-    whole = figure(9.2, 5.4)
-    axes = whole.subplot_mosaic("aab;aab;aac", width_ratios=[1, 1, 1.25])
+    whole = figure(6.4, 8.4)
+    axes = whole.subplot_mosaic("aa;bc", width_ratios=[1.25, 1], height_ratios=[2.2, 1])
     _plan(axes["a"])
     _elevation(axes["b"])
     _strut(axes["c"])
@@ -58,7 +58,7 @@ def _plan(axes: Axes) -> None:
     label(axes, (0, 112), "y", VERMILION, 10)
     label(axes, (0, -45), "base joints B on Ø 600", BLACK)
     label(axes, (0, -75), "platform joints P on Ø 400", BLUE)
-    axes.set_title("plan, seen from above")
+    axes.set_title("plan, seen from above; all lengths in mm")
     axes.set(xlim=(-400, 470), ylim=(-445, 445))
 
 
@@ -106,7 +106,7 @@ def _strut(axes: Axes) -> None:
         axes.plot([0, length], [y, y], "o", color=color, markersize=5)
     dimension(axes, (0, 105), (480, 105), "480 retracted", ends=[(0, 60), (480, 60)])
     dimension(axes, (0, -50), (630, -50), "630 extended", ends=[(0, 0), (630, 0)])
-    axes.set_title("strut, from joint centre to joint centre")
+    axes.set_title("strut, joint centre to joint centre")
     axes.set(xlim=(-20, 650), ylim=(-80, 135))
 
 
