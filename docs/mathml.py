@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from itertools import cycle
+
 from docutils.nodes import SkipNode
 from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.errors import ExtensionError
+
+
+BAR = re.compile(r"<mo[^>]*>([|‖])</mo>")
 
 
 def inline(self, node):
@@ -14,15 +20,22 @@ def inline(self, node):
 
 
 def block(self, node):
-    self.body.append(f'<div class="formula">{_converted(node, True)}</div>\n')
+    self.body.append(f'<div style="overflow-x: auto">{_converted(node, True)}</div>\n')
     raise SkipNode
 
 
 def _converted(node, as_block: bool) -> str:
     try:
-        return str(tex2mathml(node.astext(), as_block=as_block))
+        formula = str(tex2mathml(node.astext(), as_block=as_block))
     except MathError as error:
         raise ExtensionError(f"{node.source}: formula {node.astext()!r}: {error}") from error
+    sides = cycle(("prefix", "postfix"))  # bars come in pairs, as tall as a letter
+    return BAR.sub(
+        lambda bar: (
+            f'<mo form="{next(sides)}" stretchy="false" lspace="0" rspace="0">{bar[1]}</mo>'
+        ),
+        formula,
+    )
 
 
 def setup(app):
