@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers draw by themselves: pages need no script from the network."""
+"""Formulas as MathML, which browsers draw by themselves: no script from the network is needed."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.errors import ExtensionError
 
-
 BAR = re.compile(r"<mo[^>]*>([|‖])</mo>")
 
 
 def inline(self, node):
+    """Write a formula within a line; `self` is Sphinx's translator."""
     self.body.append(_converted(node, False))
     raise SkipNode
 
 
 def block(self, node):
+    """Write a formula of its own; where it is too wide, it scrolls."""
     self.body.append(f'<div style="overflow-x: auto">{_converted(node, True)}</div>\n')
     raise SkipNode
 
@@ -39,5 +40,6 @@ def _converted(node, as_block: bool) -> str:
 
 
 def setup(app):
+    """Make it the renderer that `html_math_renderer` can name."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     return {"parallel_read_safe": True}

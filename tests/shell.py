@@ -52,13 +52,18 @@ def _here(arguments: list[str], target: str | None) -> tuple[str, int]:
         contextlib.redirect_stdout(told),
         contextlib.redirect_stderr(out),
     ):
-        try:
-            cli.main(arguments)
-        except SystemExit as end:
-            code = int(end.code or 0)
+        code = _exit_code(arguments)
     if target:
         Path(target).write_text(told.getvalue(), "utf-8")
     return COMPILED.sub("", out.getvalue()), code
+
+
+def _exit_code(arguments: list[str]) -> int:
+    try:
+        cli.main(arguments)
+    except SystemExit as end:
+        return int(end.code or 0)
+    raise AssertionError("gough returned without an exit code")
 
 
 def _bash(command: str) -> tuple[str, int]:

@@ -110,7 +110,9 @@ def singularity() -> Figure:
         (spread[:, 2], BLUE, "--", "z"),
     ):
         right.plot(angle, values, line, color=color, linewidth=1.6, label=name)
-    right.plot(angle, 150 * spread[:, 5], ":", color=GREEN, linewidth=2, label="turn about z, at 150 mm")
+    right.plot(
+        angle, 150 * spread[:, 5], ":", color=GREEN, linewidth=2, label="turn about z, at 150 mm"
+    )
     right.set(yscale="log", ylabel="standard deviation [mm]\nfor 0.01 mm of each leg")
     right.legend()
     for axes in (left, right):

@@ -1,4 +1,4 @@
-"""What all figures share: colours, arrows, dimensions, and files that come out the same each time."""
+"""What all figures share: colours, arrows, dimensions, files that come out the same each time."""
 
 from __future__ import annotations
 

@@ -68,7 +68,12 @@ def _pair(axes: Axes, middle: float, half: float, radius: float, inner: float, c
         ends = polar(1, degrees) * np.array([[start], [radius + 12]])
         axes.plot(*ends.T, color=color, linewidth=0.5, linestyle=(0, (8, 2, 1, 2)))
     arc(axes, radius, middle - half, middle + half, color=color, linewidth=0.7)
-    label(axes, polar(max(radius + 44, BASE_RADIUS + 48), middle), f"2 × {half}°\nabout {middle}°", color)
+    label(
+        axes,
+        polar(max(radius + 44, BASE_RADIUS + 48), middle),
+        f"2 × {half}°\nabout {middle}°",
+        color,
+    )
 
 
 def _elevation(axes: Axes) -> None:
@@ -140,7 +145,7 @@ def rotary_leg() -> Figure:
     label(axes, middle, "q", BLUE, 11)
     axes.plot(0, 0, "o", color=BLACK)
     axes.plot(*joint, "o", color=GREEN, markersize=7)
-    label(axes, joint + (0.75, 0.12), "platform joint", GREEN)
+    label(axes, joint + np.array([0.75, 0.12]), "platform joint", GREEN)
     label(axes, (-0.05, -0.22), "base: centre of the arm", BLACK)
     tip = arm * np.array([np.cos(angle), np.sin(angle)])
     label(axes, (tip + joint) / 2 + (0.42, 0.05), "rod_length", BLUE)
