@@ -31,6 +31,7 @@ html_title = f"gough {__version__}"
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_type_aliases = {"ArrayLike": "ArrayLike", "Array": "Array"}  # not what they stand for
 autodoc_preserve_defaults = True
 # a page may describe a part of the library whose own libraries are not installed here
 autodoc_mock_imports = [
@@ -44,6 +45,7 @@ autodoc_mock_imports = [
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+napoleon_attr_annotations = False  # attributes are described by their shapes
 
 
 def name_every_page(app, page, source):
@@ -57,5 +59,15 @@ def name_every_page(app, page, source):
         source[0] += f"\n```{{toctree}}\n:caption: More\n:hidden:\n\n{entries}\n```\n"
 
 
+LONG = re.compile(r"~?(?:numpy\.)?ndarray\[[^\]]*\], ~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]")
+ALIAS = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+
+
+def shorten_signature(app, what, name, thing, options, *texts):
+    """Say NDArray[bool] where autodoc spells out what that stands for."""
+    return tuple(text and ALIAS.sub(r"\1", LONG.sub(r"NDArray[\1]", text)) for text in texts)
+
+
 def setup(app):
+    app.connect("autodoc-process-signature", shorten_signature)
     app.connect("source-read", name_every_page)

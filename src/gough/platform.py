@@ -148,14 +148,14 @@ class Platform:
 
     @cached_property
     def home_legs(self) -> Array:
-        """Readings at home, (6,): lengths, zeros (length_change) or angles [rad]."""
+        """Readings at home (6,), which are lengths, zeros (length_change) or angles [rad]."""
         from gough.kinematics import leg_lengths
 
         return frozen(leg_lengths(self, self.home))
 
     @cached_property
     def size(self) -> float:
-        """The largest distance between two joints at home: what tolerances are relative to."""
+        """The largest distance between two joints at home, which tolerances are relative to."""
         points = np.vstack([self.base, self._moving_at_home()])
         return float(max(np.linalg.norm(a - b) for a, b in combinations(points, 2)))
 

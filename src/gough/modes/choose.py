@@ -42,7 +42,7 @@ class Choice:
 
     @property
     def ambiguous(self) -> NDArray[np.bool_]:
-        """() or (N,) more than one pose passes every filter: readings alone cannot decide."""
+        """() or (N,) more than one pose passes every filter, so readings alone cannot decide."""
         return self.count > 1
 
     @property
