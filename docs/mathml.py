@@ -10,6 +10,12 @@ from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.errors import ExtensionError
 
+# LaTeX that docutils does not know, and what it does know in its place
+INSTEAD = (
+    (re.compile(r"\\[bB]igg?[lrm]?(?![a-zA-Z])\s*"), ""),
+    (re.compile(r"\\dots(?![a-z])"), r"\\ldots"),
+    (re.compile(r"\\([td]?frac)\s*(\d)\s*(\d)"), r"\\\1{\2}{\3}"),
+)
 BAR = re.compile(r"<mo[^>]*>([|‖])</mo>")
 
 
@@ -26,8 +32,11 @@ def block(self, node):
 
 
 def _converted(node, as_block: bool) -> str:
+    tex = node.astext()
+    for pattern, known in INSTEAD:
+        tex = pattern.sub(known, tex)
     try:
-        formula = str(tex2mathml(node.astext(), as_block=as_block))
+        formula = str(tex2mathml(tex, as_block=as_block))
     except MathError as error:
         raise ExtensionError(f"{node.source}: formula {node.astext()!r}: {error}") from error
     sides = cycle(("prefix", "postfix"))  # bars come in pairs, as tall as a letter
