@@ -10,7 +10,7 @@ from style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, arrow, figure, la
 
 def leg_equation() -> Figure:
     """Left the vectors of one leg, right how a small motion of the platform changes it."""
-    whole = figure(8.4, 3.6)
+    whole = figure(6.8, 3.3)
     left, right = whole.subplots(1, 2)
     _vectors(left)
     _rate(right)

@@ -27,7 +27,7 @@ def newton() -> Figure:
     platform = gough.Platform.load("reference")
     true = platform.sample_poses(5000, seed=5)
     legs = gough.leg_lengths(platform, true)
-    whole = figure(8.4, 3.3)
+    whole = figure(6.8, 3.1)
     left, right = whole.subplots(1, 2)
     seeds = (("home", VERMILION, "o"), ("polynomial", BLUE, "s"), ("polynomial-5", GREEN, "^"))
     for seed, color, marker in seeds:
@@ -48,7 +48,7 @@ def newton() -> Figure:
 
 def two_modes() -> Figure:
     """A point on two legs, and a hexapod on six: the same lengths, more than one place."""
-    whole = figure(8.4, 3.5)
+    whole = figure(6.8, 2.8)
     left, right = whole.subplots(1, 2, width_ratios=[1, 1.5])
     _two_circles(left)
     _three_poses(right)
@@ -101,7 +101,7 @@ def singularity() -> Figure:
     distance = gough.singularity_distance(platform, pose)
     spread = np.sqrt(np.diagonal(gough.pose_covariance(platform, pose, 0.01), axis1=-2, axis2=-1))
     spread[np.abs(angle - 90) < 0.2] = np.nan  # nothing is known there
-    whole = figure(8.4, 3.2)
+    whole = figure(6.8, 3.1)
     left, right = whole.subplots(1, 2)
     left.plot(angle, distance, color=BLUE, linewidth=2)
     left.set(ylabel="distance to singularity", ylim=(0, None))
@@ -110,11 +110,9 @@ def singularity() -> Figure:
         (spread[:, 2], BLUE, "--", "z"),
     ):
         right.plot(angle, values, line, color=color, linewidth=1.6, label=name)
-    right.plot(
-        angle, 150 * spread[:, 5], ":", color=GREEN, linewidth=2, label="turn about z, at 150 mm"
-    )
+    right.plot(angle, 150 * spread[:, 5], ":", color=GREEN, linewidth=2, label="turn, at 150 mm")
     right.set(yscale="log", ylabel="standard deviation [mm]\nfor 0.01 mm of each leg")
-    right.legend()
+    right.legend(loc="upper left")
     for axes in (left, right):
         axes.grid()
         axes.set(xlabel="turn about z [deg]", xlim=(0, 120), xticks=range(0, 121, 30))
@@ -137,7 +135,7 @@ def control_loop() -> Figure:
         places.append(tracker.update(reading).position[1])
         events.append(tracker.event)
     alone = gough.solve(platform, legs, seed="home").pose.position[:, 1]
-    whole = figure(7.2, 3.2)
+    whole = figure(6.4, 3.1)
     axes = whole.subplots()
     axes.plot(time, alone, color=GREY, linewidth=1.2, label="each reading by itself")
     axes.plot(time, places, color=BLUE, linewidth=2, label="Tracker")
