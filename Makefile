@@ -29,6 +29,7 @@ docs: $(VENV)/.docs
 
 pictures: $(VENV)/.dev
 	$(BIN)/python tools/pictures.py
+	$(BIN)/python docs/figures/draw.py
 
 bench: $(VENV)/.dev
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
