@@ -24,7 +24,7 @@ extensions = [
 html_math_renderer = "mathml"
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "results/discussion.md", "results/runs"]
 
 html_theme = "furo"
 html_title = f"gough {__version__}"
