@@ -10,6 +10,7 @@ from gough.platform import Platform
 
 BLUE, GREEN, YELLOW, VERMILION = "#0072B2", "#009E73", "#F0E442", "#D55E00"
 ORANGE, GREY = "#E69F00", "#7A8590"
+GROUND, GROUND_FIFTH = "#DDE1E5", "#B9C0C7"
 BASE, PLATE = "#A7B0B8", "#5B6B7B"
 RAMP = (BLUE, GREEN, YELLOW)  # lowest, middle and highest reading of a stroke
 OUT = "#D1001C"  # out of stroke: red, and darker than any colour of the ramp

@@ -158,7 +158,7 @@ class ModesPanel:
                 fails = [name for name, passed in choice.passes.items() if not passed[i]]
                 self._add(
                     int(i), words.mode_label(number, modes.pose.position[i], euler[i],
-                    self._platform), modes.sign[i], fails,
+                    self._platform), float(modes.sign[i]), fails,
                 )  # fmt: skip
         status = ModesStatus(int(modes.status))
         certified = int(modes.certified.sum())

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 JOINT, THICK, THIN, PLATE = 0.017, 0.014, 0.0075, 0.014
 LOOK_FROM = np.array([1.05, -1.75, 0.95])  # where the camera is, seen from the middle
 BESIDE = 0.2  # how far the picture is moved for the panel
-GRID = 3.0
+GRID = 3.0  # width of the ground's grid
 FEW = 16  # ghosts; more of them are drawn fainter
 
 
@@ -127,8 +127,8 @@ class Scene:
         with self._server.atomic():
             plates = self._server.scene.add_batched_meshes_simple(
                 "/ghosts/plates", mesh.vertices, mesh.faces, pose.wxyz, places,
-                batched_colors=paint, opacity=0.35 if len(pose) <= FEW else 0.2, side="double", flat_shading=True,
-                cast_shadow=False, receive_shadow=False, lod="off",
+                batched_colors=paint, opacity=0.35 if len(pose) <= FEW else 0.2, side="double",
+                flat_shading=True, cast_shadow=False, receive_shadow=False, lod="off",
             )  # fmt: skip
             joints = self.frame.drawn(joint_positions(self.platform, pose))
             starts = self.frame.drawn(shapes.limbs(self.platform, pose[0], legs).thin_start)
@@ -181,9 +181,10 @@ class Scene:
         self._server.scene.set_up_direction("+z")
 
     def _set_lights(self) -> None:
-        """Neutral light, in which colours are what the legend says."""
+        """Neutral light, in which colours are what the legend says, and no costly shadows."""
         self._server.scene.configure_environment_map(hdri=None)
         self._server.scene.add_light_ambient("/light", intensity=1.4)
+        self._server.scene.configure_default_lights(cast_shadow=False)
 
     def _add_ground(self) -> None:
         """A grid of round numbers, below everything."""
@@ -191,10 +192,10 @@ class Scene:
         self.cell = shapes.round_number(0.1 * self.frame.size)
         cell = self.cell / self.frame.size
         self._server.scene.add_grid(
-            "/grid", GRID, GRID, position=(0.0, 0.0, low), cell_size=cell, section_size=5 * cell,
-            cell_color=(225, 228, 231), section_color=(195, 200, 205), cell_thickness=0.6,
-            section_thickness=0.9, fade_distance=6.0, fade_strength=2.0, fade_from="origin",
-            shadow_opacity=0.08,
+            "/ground", GRID, GRID, position=(0.0, 0.0, low), cell_size=cell,
+            section_size=5 * cell, cell_color=colors.rgb(colors.GROUND), cell_thickness=0.6,
+            section_color=colors.rgb(colors.GROUND_FIFTH), section_thickness=0.9,
+            fade_distance=6.0, fade_strength=2.0, fade_from="origin", shadow_opacity=0.0,
         )  # fmt: skip
 
     def _add_base(self) -> None:
@@ -251,8 +252,7 @@ class Scene:
     def _add_slab(self, name: str, joints: Array, color: str) -> None:
         mesh = shapes.plate(joints, PLATE)
         self._server.scene.add_mesh_simple(
-            name, mesh.vertices, mesh.faces, color=colors.rgb(color), opacity=0.85,
-            side="double", flat_shading=True,
+            name, mesh.vertices, mesh.faces, color=colors.rgb(color), flat_shading=True,
         )  # fmt: skip
 
     def _add_balls(

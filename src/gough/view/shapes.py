@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.kinematics import equivalent_struts, joint_positions
@@ -21,7 +22,7 @@ class Mesh(NamedTuple):
     """Corners (V, 3) and triangles (F, 3)."""
 
     vertices: Array
-    faces: Array
+    faces: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def sphere(rings: int = 10, sides: int = 16) -> Mesh:
 
 
 def plate(joints: Array, thickness: float, margin: float = 1.1) -> Mesh:
-    """A slab through six joints (6, 3), a little wider than they are.
+    """A slab whose upper side holds six joints (6, 3), a little wider than they are.
 
     The joints are taken in the order in which they stand around their centre, and need not lie
     in a plane; the plate then is a tent over them.
@@ -134,9 +135,9 @@ def plate(joints: Array, thickness: float, margin: float = 1.1) -> Mesh:
         up, normal = -up, -normal
     order = np.argsort(np.arctan2((joints - centre) @ up, (joints - centre) @ right))
     rim = centre + margin * (joints[order] - centre)
-    half = thickness / 2 * normal
-    top, bottom = np.concatenate([rim, [centre]]) + half, np.concatenate([rim, [centre]]) - half
-    edge = np.concatenate([rim + half, rim - half])
+    down = -thickness * normal
+    top = np.concatenate([rim, [centre]])
+    edge = np.concatenate([rim, rim + down])
     i = np.arange(6)
     j = (i + 1) % 6
     hub = np.full(6, 6)
@@ -145,7 +146,7 @@ def plate(joints: Array, thickness: float, margin: float = 1.1) -> Mesh:
         (20 + i, 20 + j, 14 + j), (20 + i, 14 + j, 14 + i),
     ]  # fmt: skip
     faces = np.concatenate([np.stack(p, axis=-1) for p in parts])
-    return Mesh(np.concatenate([top, bottom, edge]), faces)
+    return Mesh(np.concatenate([top, top + down, edge]), faces)
 
 
 def label_places(joints: Array) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.errors import GoughError, InputError
@@ -82,17 +83,17 @@ class Thin:
 
     def __init__(self, most: int) -> None:
         self._most, self._step, self._seen = most, 1, 0
-        self._kept: list[Array] = []
+        self._kept: list[NDArray[np.floating]] = []
         self._held = 0
 
     def add(self, values: Array) -> None:
         """Rows (n, K) of the stream."""
         number = self._seen + np.arange(len(values))
-        rows = np.concatenate([number[:, None] + 1.0, values], axis=1)
+        rows = np.column_stack([number + 1.0, values])
         self._seen += len(values)
         self._hold(rows[number % self._step == 0])
 
-    def _hold(self, rows: Array) -> None:
+    def _hold(self, rows: NDArray[np.floating]) -> None:
         self._kept.append(rows)
         self._held += len(rows)
         while self._held > self._most:
@@ -104,7 +105,7 @@ class Thin:
     @property
     def rows(self) -> tuple[Array, Array, int]:
         """Numbers (N,) from 1, values (N, K), and how many rows there were in all."""
-        every = np.concatenate(self._kept)
+        every = np.concatenate(self._kept, dtype=np.float64)
         return every[:, 0], every[:, 1:], self._seen
 
 

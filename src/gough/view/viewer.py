@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from gough.modes.result import AssemblyModes
 
 SAME_POSE = 1e-7  # shares of the size and radians that tell modes from the picture's pose
+SPEAKING = 1 / 20  # [s] between changes of the panel's numbers
 FRAME = 1 / 60  # [s] between rows that are played
 PATIENCE = 2.0  # [s] to wait for a browser before the solver is compiled
 COMPILING = (
@@ -51,11 +52,11 @@ class Wishes:
                 self._queue.append((kind, dict(what)))
             self._news.notify()
 
-    def take(self) -> tuple[str, dict]:
-        """The next wish, once there is one."""
+    def take(self, patience: float | None) -> tuple[str, dict] | None:
+        """The next wish, once there is one; None if there is none for `patience` [s]."""
         with self._news:
-            self._news.wait_for(lambda: self._queue)
-            return self._queue.popleft()
+            self._news.wait_for(lambda: self._queue, patience)
+            return self._queue.popleft() if self._queue else None
 
 
 class Viewer:
@@ -91,7 +92,8 @@ class Viewer:
         if trajectory is not None:
             self.scene.show_way(trajectory.pose)
             self._show_row({"row": 0})
-        self._refresh()
+        self._draw()
+        self._tell()
         for work in (self._work, self._prepare):
             threading.Thread(target=self._guarded, args=(work,), daemon=True).start()
 
@@ -121,10 +123,18 @@ class Viewer:
 
     def _work(self) -> None:
         """Carry out wishes, one after the other."""
+        told, stale = 0.0, False
         while True:
-            kind, what = self._wishes.take()
-            getattr(self, f"_on_{kind}")(what)
-            self._refresh()
+            wish = self._wishes.take(SPEAKING if stale else None)
+            if wish is not None:
+                kind, what = wish
+                getattr(self, f"_on_{kind}")(what)
+                self._draw()
+            # numbers that nobody can read are left out, for the picture's sake
+            stale = wish is not None and time.monotonic() - told < SPEAKING
+            if not stale:
+                self._tell()
+                told = time.monotonic()
 
     def _prepare(self) -> None:
         """Compile what leg sliders need, after the browser has drawn, which would be held up."""
@@ -250,15 +260,18 @@ class Viewer:
         rows = self.trajectory
         self.model.show(rows.pose[i], rows.legs[i], rows.answers[i])
 
-    def _refresh(self) -> None:
-        """Bring picture and panel to the model."""
+    def _draw(self) -> None:
+        """Bring the picture to the model."""
         if self._modes is not None and not np.array_equal(self._modes.legs, self.model.legs):
             self._modes = None
             self.scene.clear_ghosts()
             self.panel.modes.clear(OUTDATED)
+        self.scene.draw(self.model.pose, self.model.legs, handle=not self._dragging)
+
+    def _tell(self) -> None:
+        """Bring the panel to the model."""
         self.panel.modes.mark(self._shown_mode())
         with self.server.atomic():
-            self.scene.draw(self.model.pose, self.model.legs, handle=not self._dragging)
             self.panel.show(self.model, self._note)
             if self.trajectory is not None:
                 self.panel.player.show(self._row, self._playing)

@@ -14,6 +14,8 @@ from gough.view.model import Model
 from gough.view.ranges import leg_factor
 
 POSE_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+# viser's boxes beside sliders are too narrow for more than five digits
+STYLE = "<style>[style*='width: 3rem']{width:4.6rem !important}</style>"
 CLOSE = 0.2  # share of home's distance to a singularity that deserves a warning
 SMALL = "font-size:0.8em;color:#5B6670"
 
@@ -46,7 +48,7 @@ def status_card(model: Model, note: str = "") -> str:
     asked = "" if answer.reached else f"<div style='{SMALL}'>{_asked_for(model)}</div>"
     aside = f"<div style='{SMALL};margin-top:0.3em'>{escape(note)}</div>" if note else ""
     return (
-        f"<div style='margin:0.4em 0.75em;padding:0.1em 0 0.1em 0.7em;"
+        f"{STYLE}<div style='margin:0.4em 0.75em;padding:0.1em 0 0.1em 0.7em;"
         f"border-left:4px solid {edge};font-size:0.85em;line-height:1.35;min-height:9.5em'>"
         f"<div data-gough='status' data-reached='{str(answer.reached).lower()}'>"
         f"{escape(answer.text)}</div>"
