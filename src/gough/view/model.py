@@ -159,5 +159,5 @@ class Model:
 
 
 def pose_numbers(pose: Pose) -> Array:
-    """x, y, z and Euler angles [deg] of a pose, (6,)."""
-    return np.concatenate([pose.position, np.degrees(pose.euler)])
+    """x, y, z and Euler angles [deg] of poses, (..., 6)."""
+    return np.concatenate([pose.position, np.degrees(pose.euler)], axis=-1)

@@ -23,6 +23,7 @@ LOOK_FROM = np.array([1.05, -1.75, 0.95])  # where the camera is, seen from the 
 BESIDE = 0.2  # how far the picture is moved for the panel
 GRID = 3.0  # width of the ground's grid
 FEW = 16  # ghosts; more of them are drawn fainter
+DEEPER = 0.6  # what light from two sides adds to them is taken off first
 
 
 class Scene:
@@ -122,7 +123,8 @@ class Scene:
             return
         mesh = shapes.plate((self.platform.moving - self._hub) / self.frame.size, PLATE / 2)
         same = np.asarray(sign)[:, None] > 0
-        paint = np.where(same, colors.rgb(colors.SAME), colors.rgb(colors.OTHER)).astype(np.uint8)
+        paint = np.where(same, colors.rgb(colors.SAME), colors.rgb(colors.OTHER))
+        paint = (DEEPER * paint).astype(np.uint8)
         places = np.stack([self._place_of(pose[i]) for i in range(len(pose))])
         with self._server.atomic():
             plates = self._server.scene.add_batched_meshes_simple(
@@ -183,7 +185,7 @@ class Scene:
     def _set_lights(self) -> None:
         """Neutral light, in which colours are what the legend says, and no costly shadows."""
         self._server.scene.configure_environment_map(hdri=None)
-        self._server.scene.add_light_ambient("/light", intensity=1.4)
+        self._server.scene.add_light_ambient("/light", intensity=1.0)
         self._server.scene.configure_default_lights(cast_shadow=False)
 
     def _add_ground(self) -> None:

@@ -130,9 +130,9 @@ def plate(joints: Array, thickness: float, margin: float = 1.1) -> Mesh:
     in a plane; the plate then is a tent over them.
     """
     centre = joints.mean(axis=0)
-    right, up, normal = np.linalg.svd(joints - centre)[2]
-    if normal @ [0, 0, 1] < 0:
-        up, normal = -up, -normal
+    right, _, normal = np.linalg.svd(joints - centre)[2]
+    normal = -normal if normal[2] < 0 else normal
+    up = np.cross(normal, right)
     order = np.argsort(np.arctan2((joints - centre) @ up, (joints - centre) @ right))
     rim = centre + margin * (joints[order] - centre)
     down = -thickness * normal

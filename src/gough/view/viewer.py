@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -94,8 +95,8 @@ class Viewer:
             self._show_row({"row": 0})
         self._draw()
         self._tell()
-        for work in (self._work, self._prepare):
-            threading.Thread(target=self._guarded, args=(work,), daemon=True).start()
+        self._worker = self._start(self._work)
+        self._start(self._prepare)
 
     @property
     def port(self) -> int:
@@ -109,17 +110,26 @@ class Viewer:
         raise self._failure
 
     def close(self) -> None:
-        """End the server."""
+        """End the server and the threads behind it; one that compiles ends when it has done so."""
         self._playing = False
+        self._wishes.post("close", {})
+        self._worker.join()
         servers.stop(self.server)
 
     # ---- threads ----------------------------------------------------------------------
 
-    def _guarded(self, work: Any) -> None:
-        try:
-            work()
-        except BaseException as error:  # `wait` raises it in the main thread
-            self._failure = error
+    def _start(self, work: Callable[..., None], *arguments: Any) -> threading.Thread:
+        """Run something beside the rest; what it raises, `wait` raises in the main thread."""
+
+        def run() -> None:
+            try:
+                work(*arguments)
+            except BaseException as error:
+                self._failure = error
+
+        thread = threading.Thread(target=run, daemon=True)
+        thread.start()
+        return thread
 
     def _work(self) -> None:
         """Carry out wishes, one after the other."""
@@ -128,6 +138,8 @@ class Viewer:
             wish = self._wishes.take(SPEAKING if stale else None)
             if wish is not None:
                 kind, what = wish
+                if kind == "close":
+                    return
                 getattr(self, f"_on_{kind}")(what)
                 self._draw()
             # numbers that nobody can read are left out, for the picture's sake
@@ -165,11 +177,6 @@ class Viewer:
         from gough.modes.assembly import assembly_modes
 
         self._wishes.post("found", {"modes": assembly_modes(self.platform, legs)})
-
-    def _start(self, work: Any, *arguments: Any) -> None:
-        threading.Thread(
-            target=self._guarded, args=(lambda: work(*arguments),), daemon=True
-        ).start()
 
     # ---- wishes -----------------------------------------------------------------------
 
