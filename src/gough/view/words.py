@@ -46,7 +46,7 @@ def status_card(model: Model, note: str = "") -> str:
     if answer.seconds:
         took.append(_duration(answer.seconds))
     asked = "" if answer.reached else f"<div style='{SMALL}'>{_asked_for(model)}</div>"
-    aside = f"<div style='{SMALL};margin-top:0.3em'>{escape(note)}</div>" if note else ""
+    aside = f"<div data-gough='note' style='{SMALL}'>{escape(note)}</div>" if note else ""
     return (
         f"{STYLE}<div style='margin:0.4em 0.75em;padding:0.1em 0 0.1em 0.7em;"
         f"border-left:4px solid {edge};font-size:0.85em;line-height:1.35;min-height:9.5em'>"
