@@ -160,7 +160,7 @@ def test_the_handle_moves_the_plate(show: Show, tab: Tab):
     assert viewer.scene.handle is not None
     tab.settle()
     hub = np.array(viewer.scene.handle.position)
-    start, end = (on_screen(viewer, hub + [0, 0, h]) for h in (0.15, 0.25))
+    start, end = (on_screen(viewer, hub + np.array([0, 0, h])) for h in (0.15, 0.25))
     tab.page.mouse.move(*start)
     tab.page.mouse.move(start[0] + 1, start[1])
     tab.page.mouse.down()
@@ -197,16 +197,16 @@ def test_a_file_plays(show: Show, tab: Tab):
     tab.page.get_by_text(trajectory.about).wait_for()
     tab.page.get_by_text("row 1 of 1,000").wait_for()
     tab.shot("first")
-    tab.number(0).fill("50")
-    tab.page.get_by_text(trajectory.where(50)).wait_for()
-    np.testing.assert_allclose(viewer.model.legs, trajectory.legs[50], atol=0)
+    tab.number(0).fill("30")
+    tab.page.get_by_text(trajectory.where(30)).wait_for()
+    np.testing.assert_allclose(viewer.model.legs, trajectory.legs[30], atol=0)
     tab.click("Play")
     tab.click("Pause")
-    assert 50 <= viewer._row < 100
-    tab.number(0).fill("98")
-    tab.page.get_by_text(trajectory.where(98)).wait_for()
+    assert 30 <= viewer._row < len(trajectory)
+    tab.number(0).fill(str(len(trajectory) - 2))
+    tab.page.get_by_text(trajectory.where(len(trajectory) - 2)).wait_for()
     tab.click("Play")
-    tab.page.get_by_text(trajectory.where(99)).wait_for()
+    tab.page.get_by_text(trajectory.where(len(trajectory) - 1)).wait_for()
     tab.page.get_by_role("button", name="Play").wait_for()  # it stops at the end
     tab.shot("last")
 

@@ -22,7 +22,7 @@ JOINT, THICK, THIN, PLATE = 0.017, 0.014, 0.0075, 0.014
 LOOK_FROM = np.array([1.05, -1.75, 0.95])  # where the camera is, seen from the middle
 BESIDE = 0.2  # how far the picture is moved for the panel
 GRID = 3.0  # width of the ground's grid
-FEW = 16  # ghosts; more of them are drawn fainter
+FAINT = 0.08, 0.35, 4.0  # ghosts' opacity: least, most, and how much all have together
 DEEPER = 0.6  # what light from two sides adds to them is taken off first
 
 
@@ -123,13 +123,15 @@ class Scene:
             return
         mesh = shapes.plate((self.platform.moving - self._hub) / self.frame.size, PLATE / 2)
         same = np.asarray(sign)[:, None] > 0
+        least, most, together = FAINT
+        opacity = min(max(together / len(pose), least), most)
         paint = np.where(same, colors.rgb(colors.SAME), colors.rgb(colors.OTHER))
         paint = (DEEPER * paint).astype(np.uint8)
         places = np.stack([self._place_of(pose[i]) for i in range(len(pose))])
         with self._server.atomic():
             plates = self._server.scene.add_batched_meshes_simple(
                 "/ghosts/plates", mesh.vertices, mesh.faces, pose.wxyz, places,
-                batched_colors=paint, opacity=0.35 if len(pose) <= FEW else 0.2, side="double",
+                batched_colors=paint, opacity=opacity, side="double",
                 flat_shading=True, cast_shadow=False, receive_shadow=False, lod="off",
             )  # fmt: skip
             joints = self.frame.drawn(joint_positions(self.platform, pose))

@@ -257,7 +257,8 @@ class Viewer:
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         html = page(self.model).encode()
-        (client or self.server).send_file_download(f"{self.platform.name}.html", html)
+        name = f"{self.platform.name}.html"
+        (client or self.server).send_file_download(name, html, save_immediately=True)
 
     # ---- the picture ------------------------------------------------------------------
 
