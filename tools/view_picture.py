@@ -39,7 +39,7 @@ def main(path: str) -> None:
         page.locator("[data-gough=note]").wait_for(state="detached")
         page.locator(".mantine-Notification-closeButton").click()
         boxes = page.locator(".mantine-NumberInput-input")
-        for row, value in enumerate((0.009, -0.006, 0.0095, 0.3, -0.25, 0.05)):
+        for row, value in enumerate((0.001, 0.008, 0.01, -0.4, 0.1, -0.1)):
             boxes.nth(6 + row).fill(str(value))
         page.locator("[data-gough=took]", has_text="inverse").wait_for()
         page.mouse.click(300, 780)  # takes the cursor out of the box
@@ -47,8 +47,8 @@ def main(path: str) -> None:
         page.screenshot(path=path)
         browser.close()
     with Image.open(path) as picture:
-        plain = picture.convert("RGB")
-    plain.save(path, optimize=True)
+        small = picture.convert("RGB").quantize(256, kmeans=4, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
 
 
 if __name__ == "__main__":

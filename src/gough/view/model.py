@@ -16,6 +16,7 @@ from gough.files.placing import PLACED, placed
 from gough.kinematics import leg_lengths, singularity_distance, strut_vectors
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.view import colors
 from gough.view.follow import follow
 
 STAYS = "The picture stays where it was."
@@ -134,6 +135,11 @@ class Model:
     def singularity_share(self) -> float:
         """The same as a share of that at home; may be NaN."""
         return self.singularity / self._home_distance
+
+    @property
+    def out_of_stroke(self) -> bool:
+        """Whether a leg is beyond its limits."""
+        return bool(colors.out_of_stroke(self.platform, self.legs).any())
 
     # ---- inside -----------------------------------------------------------------------
 

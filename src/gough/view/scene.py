@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # radii and thicknesses, as shares of the platform's size
 JOINT, THICK, THIN, PLATE = 0.017, 0.014, 0.0075, 0.014
 LOOK_FROM = np.array([1.05, -1.75, 0.95])  # where the camera is, seen from the middle
-BESIDE = 0.2  # how far the picture is moved for the panel
+BESIDE = 0.26  # how far the picture is moved for the panel
 GRID = 3.0  # width of the ground's grid
 FAINT = 0.08, 0.35, 4.0  # ghosts' opacity: least, most, and how much all have together
 DEEPER = 0.6  # what light from two sides adds to them is taken off first

@@ -37,7 +37,10 @@ def status_card(model: Model, note: str = "") -> str:
         note: something that is going on besides.
     """
     answer = model.answer
-    edge = colors.GREEN if answer.reached else colors.OUT
+    edge = colors.OUT
+    if answer.reached:
+        well = model.singularity_share > CLOSE and not model.out_of_stroke
+        edge = colors.GREEN if well else colors.ORANGE
     took = [answer.how]
     if answer.how == "forward kinematics" or answer.residual:
         took.append(f"residual {_with(answer.residual, model.platform.unit, '.3g')}")
