@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.columns import LEGS, POSITION, checked, leg_columns, pose_columns
 from gough.errors import GoughError, InputError
 from gough.files.identity import check_same
-from gough.files.names import LEGS, POSITION, checked, leg_columns, pose_columns
-from gough.files.placing import PLACED, placed, poses_from_columns
+from gough.files.placing import PLACED, placed
 from gough.files.source import Reading, Source, open_source
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.tables import poses_from_columns
 from gough.view.follow import has_pose
 from gough.view.model import Answer
 
