@@ -14,6 +14,7 @@ COMMANDS = {
     "inverse": ("gough.commands.inverse", "run", "leg readings from a file of poses"),
     "modes": ("gough.commands.modes", "run", "every pose that leg readings allow, each proven"),
     "plot": ("gough.commands.plot", "FIGURES", "figures of poses, modes, workspaces and files"),
+    "view": ("gough.view.command", "run", "a machine in the browser, to look at and to drive"),
     "platforms": (
         "gough.commands.platforms", "run", "the machines that come with gough, as TOML to edit",
     ),
