@@ -51,6 +51,27 @@ def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     return checked(where, found, (*POSITION, *rotation))
 
 
+def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
+    """The columns of a pose, or LEGS of a file that holds none.
+
+    Raises:
+        InputError: some are missing or occur twice; the text lists what there is.
+    """
+    has_legs = any(name in found for name in LEGS)
+    if not has_legs and not any(name in found for name in POSITION):
+        raise InputError(
+            f"{where}: holds neither legs nor poses; expected columns leg_1 to leg_6, or x, y, z "
+            "and one of qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg; found "
+            f"{_list(found)}"
+        )
+    try:
+        return pose_columns(where, found)
+    except InputError:
+        if not has_legs:
+            raise
+        return leg_columns(where, found)
+
+
 def pose_names(angles: Angles | None) -> tuple[str, ...]:
     """The columns that a pose is written to: with Euler angles in these units, or a quaternion.
 

@@ -114,7 +114,7 @@ def test_times_that_do_not_rise_are_an_error(platform, tmp_path, times):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a,b\n1,2\n", "neither poses .* nor readings .*found a, b"),
+        ("a,b\n1,2\n", "neither legs nor poses.*found a, b"),
         ("leg_1,leg_2\n1,2\n", "no column leg_3, leg_4, leg_5, leg_6"),
         ("x,y,z\n1,2,3\n", "no whole set of rotation columns"),
         (f"{LEGS}\n1,2,3,4,5,text\n", "line 2.*leg_6"),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.columns import LEGS, STATUS, checked, leg_columns, pose_columns
+from gough.columns import LEGS, STATUS, checked, pose_columns, pose_or_leg_columns
 from gough.errors import InputError
 from gough.files.block import Block
 from gough.files.identity import check_same
@@ -55,7 +55,8 @@ def read_trajectory(
     """
     envelope = Envelope(SIGNALS)
     with closing(open_source(path)) as source:
-        names, poses = _pose_or_legs(source)
+        names = pose_or_leg_columns(source.where, source.columns)
+        poses = names != LEGS
         for block in _blocks(source, platform, names, reading, time):
             if poses:
                 pose, _ = poses_from_columns(block.numbers(names), names)
@@ -143,7 +144,8 @@ def read_pose(path: str | Path, platform: Platform, row: int, seed: str = "auto"
     """
     seen = 0
     with closing(open_source(path)) as source:
-        names, poses = _pose_or_legs(source)
+        names = pose_or_leg_columns(source.where, source.columns)
+        poses = names != LEGS
         for block in _blocks(source, platform, names, Reading(), None):
             if seen < row <= seen + len(block):
                 values = block.numbers(names)[row - seen - 1 : row - seen]
@@ -170,19 +172,6 @@ def _times(block: Block, column: str | None, before: int) -> Array:
 
 
 # ---- parts ----------------------------------------------------------------------------
-
-
-def _pose_or_legs(source: Source) -> tuple[tuple[str, ...], bool]:
-    """The columns to read, and whether they are those of a pose."""
-    try:
-        return pose_columns(source.where, source.columns), True
-    except InputError:
-        if any(name in source.columns for name in LEGS):
-            return leg_columns(source.where, source.columns), False
-        raise InputError(
-            f"{source.where}: holds neither legs nor poses; expected columns leg_1 to leg_6, or "
-            "x, y, z and one of qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg"
-        ) from None
 
 
 def _blocks(

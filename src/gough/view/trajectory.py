@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.columns import LEGS, POSITION, checked, leg_columns, pose_columns
+from gough.columns import LEGS, checked, pose_or_leg_columns
 from gough.errors import GoughError, InputError
 from gough.files.identity import check_same
 from gough.files.placing import PLACED, placed
@@ -130,7 +130,7 @@ def read(
     if rows < 2:
         raise GoughError(f"--rows {rows}: expected 2 or more")
     with closing(open_source(path)) as source:
-        names = _columns(source)
+        names = pose_or_leg_columns(source.where, source.columns)
         wanted = (
             names if time is None else (*names, *checked(source.where, source.columns, (time,)))
         )
@@ -144,19 +144,6 @@ def read(
     solved = _from_legs(platform, values) if names == LEGS else _placed(platform, values, names)
     of = "leg readings" if names == LEGS else "poses"
     return Trajectory(Path(path).name, of, number, total, clock, time is not None, *solved)
-
-
-def _columns(source: Source) -> tuple[str, ...]:
-    """The columns to read: a pose if there is one, else legs."""
-    if all(name in source.columns for name in POSITION):
-        return pose_columns(source.where, source.columns)
-    if any(name in source.columns for name in LEGS):
-        return leg_columns(source.where, source.columns)
-    found = ", ".join(source.columns[:12]) or "no columns"
-    raise InputError(
-        f"{source.where}: neither poses (x, y, z and a rotation) nor readings (leg_1 to leg_6); "
-        f"found {found}"
-    )
 
 
 def _thinned(
