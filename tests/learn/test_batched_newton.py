@@ -10,7 +10,7 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from machines import reference, with_some_workspace
+from learn.machines import reference, with_some_workspace
 from support import angles, random_platforms, random_twists, scaled, seeds
 
 import gough

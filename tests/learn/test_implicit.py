@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 from hypothesis import given
-from machines import reference, with_some_workspace
+from learn.machines import reference, with_some_workspace
 from support import random_platforms
 from test_batched_newton import planted, problem
 from torch import Tensor

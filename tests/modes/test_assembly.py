@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from machines import ALL, TELESCOPIC, found, poses_of, random_platform
+from modes.machines import ALL, TELESCOPIC, found, poses_of, random_platform
 
 import gough
 from gough.modes import assembly

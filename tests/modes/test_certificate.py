@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from machines import ALL, poses_of
+from modes.machines import ALL, poses_of
 
 import gough
 from gough.fk.certificate import TURNS, _bulk_with, certify_batch

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import random_platform
+from modes.machines import random_platform
 
 import gough
 from gough.pose import wxyz_product

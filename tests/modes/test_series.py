@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from machines import poses_of
+from modes.machines import poses_of
 
 import gough
 from gough.fk.jit import jit

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from machines import griffis_duffy
+from modes.machines import griffis_duffy
 
 import gough
 from gough.modes.result import ModesStatus
