@@ -11,8 +11,8 @@ import pytest
 import torch
 from hypothesis import given
 from learn.machines import reference, with_some_workspace
+from learn.test_batched_newton import planted, problem
 from support import random_platforms
-from test_batched_newton import planted, problem
 from torch import Tensor
 from torch.autograd import gradcheck, gradgradcheck
 

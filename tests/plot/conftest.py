@@ -1,17 +1,10 @@
-"""The real command, in this process; scripts under tools/ are tested here too."""
+"""The real command, in this process."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
 
 import pytest
 
 from gough import cli
-
-TOOLS = Path(__file__).parents[2] / "tools"
-if str(TOOLS) not in sys.path:
-    sys.path.insert(0, str(TOOLS))
 
 
 @pytest.fixture
