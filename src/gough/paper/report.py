@@ -12,15 +12,16 @@ from gough.paper.plan import BATCH, machine_of
 from gough.paper.study import Study
 
 TITLE = "The DisGNet paper's experiments, run again"
-DISCUSSION = "discussion.md"
+DISCUSSION, PAGE = "discussion.md", "report.html"
 
 
 def write(study: Study) -> None:
     """Write index.md and report.html into the study's folder; the figures must be there."""
     text = "\n\n".join(part(study) for part in PARTS) + "\n"
-    write_whole(study.folder / "index.md", text.encode())
+    link = f"This page with its figures in one file: [{PAGE}]({PAGE}).\n"
+    write_whole(study.folder / "index.md", (text + "\n" + link).encode())
     html = page(text, TITLE, study.folder)
-    write_whole(study.folder / "report.html", html.encode())
+    write_whole(study.folder / PAGE, html.encode())
 
 
 def introduction(study: Study) -> str:
