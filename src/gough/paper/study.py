@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,9 +44,9 @@ class Study:
 
     # ---- networks ---------------------------------------------------------------------
 
-    def train(self, *, show: bool = True) -> None:
-        """Train whatever is not trained yet; a run that was stopped goes on."""
-        for name in SETS:
+    def train(self, sets: Iterable[str] = tuple(SETS), *, show: bool = True) -> None:
+        """Train whatever of the SETS is not trained yet; a run that was stopped goes on."""
+        for name in sets:
             for kind in MODELS:
                 target = self.network_path(name, kind)
                 if target.exists():
