@@ -67,11 +67,12 @@ def _exit_code(arguments: list[str]) -> int:
 
 
 def _bash(command: str) -> tuple[str, int]:
-    """By bash, with a `gough` that is the one under test, whether or not it is installed."""
+    """By bash, with the `gough` and the `python` under test, whatever the path holds."""
     with tempfile.TemporaryDirectory() as folder:
-        script = Path(folder, "gough")
-        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m gough.cli "$@"\n', "utf-8")
-        script.chmod(0o755)
+        for name, words in {"gough": "-m gough.cli", "python": ""}.items():
+            script = Path(folder, name)
+            script.write_text(f'#!/bin/sh\nexec "{sys.executable}" {words} "$@"\n', "utf-8")
+            script.chmod(0o755)
         sources = str(Path(cli.__file__).parents[1])
         done = subprocess.run(
             ["bash", "-c", "set -o pipefail; " + command],
