@@ -10,29 +10,27 @@ second one's what such a browser then draws, by the size of its window.
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import threading
 import time
 from contextlib import closing
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import viser
 import zstandard
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+import chromium
 
 import gough
 from gough.fk.bulk import cores
 from gough.view.viewer import Viewer
 
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
 MACHINES = ("reference", "reachy_mini", "rubin_camera")
 WINDOWS = ((640, 480), (1360, 900))
 SECONDS = 5.0
@@ -74,14 +72,12 @@ def main() -> None:
     for name in MACHINES:
         sent, came = over_the_wire(name)
         print(f"| {name} | {sent:.0f} | {came:.0f} |", flush=True)
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    found = chromium.find()
     if found is None:
-        sys.exit("no Chromium for the rest: on Debian, apt-get install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=FLAGS)
+        sys.exit(chromium.MISSING)
+    with chromium.running(found) as browser:
         start_table(browser)
         drag_table(browser)
-        browser.close()
     print(f"\nload at the end {os.getloadavg()[0]:.1f}")
 
 

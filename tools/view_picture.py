@@ -5,34 +5,27 @@ python tools/view_picture.py docs/images/view.png
 
 from __future__ import annotations
 
-import shutil
 import sys
 from contextlib import closing
 
+import chromium
 from PIL import Image
-from playwright.sync_api import sync_playwright
 
 from gough import Platform
 from gough.view.viewer import Viewer
 
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
 PATIENCE = 120_000  # [ms]
 
 
 def main(path: str) -> None:
     """Drive the page to a pose, and write what it shows."""
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    found = chromium.find()
     if found is None:
-        sys.exit("no Chromium: on Debian, apt-get install chromium")
+        sys.exit(chromium.MISSING)
     with (
-        sync_playwright() as playwright,
+        chromium.running(found) as browser,
         closing(Viewer(Platform.load("rubin_camera"), port=0)) as v,
     ):
-        browser = playwright.chromium.launch(executable_path=found, args=FLAGS)
         page = browser.new_page(viewport={"width": 1200, "height": 800})
         page.set_default_timeout(PATIENCE)
         page.goto(f"http://localhost:{v.port}")
@@ -45,7 +38,6 @@ def main(path: str) -> None:
         page.mouse.click(300, 780)  # takes the cursor out of the box
         page.wait_for_timeout(2000)  # [ms] for notices to fade
         page.screenshot(path=path)
-        browser.close()
     with Image.open(path) as picture:
         small = picture.convert("RGB").quantize(256, kmeans=4, dither=Image.Dither.NONE)
     small.save(path, optimize=True)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
 
+import chromium
 import pytest
 from playwright.sync_api import (
     Browser,
@@ -19,30 +19,22 @@ from playwright.sync_api import (
     ConsoleMessage,
     Locator,
     Page,
-    sync_playwright,
 )
 
 from gough import Platform
 from gough.view.viewer import Viewer
 
 ARTEFACTS = Path(os.environ.get("GOUGH_ARTEFACTS", Path(__file__).parents[2] / "runs" / "view"))
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
 PATIENCE = 120_000  # [ms] a busy machine may compile and draw in software
 WINDOW = {"width": 1360, "height": 900}
 
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    found = chromium.find()
     if found is None:
-        pytest.skip("no Chromium: install it, on Debian with: apt-get install chromium")
-    with sync_playwright() as playwright, ExitStack() as stack:
-        browser = playwright.chromium.launch(executable_path=found, args=FLAGS)
-        stack.callback(browser.close)
+        pytest.skip(chromium.MISSING)
+    with chromium.running(found) as browser:
         yield browser
 
 
