@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import gough
-from gough.fk import bulk
-from gough.fk.certificate import certify_batch
+from gough.certificate import certify_batch
+from gough.kernel.threads import cores
 from gough.modes.starts import find_start, start_of
 
 MACHINES = (
@@ -89,9 +89,9 @@ def special() -> None:
 
 
 def times(count: int) -> None:
-    cores = bulk.cores()
+    available = cores()
     heading(f"time per set of readings, {count} sets from the workspace")
-    print(f"{'machine':16} solutions  one call  in a batch  {cores} threads   real poses")
+    print(f"{'machine':16} solutions  one call  in a batch  {available} threads   real poses")
     for name in MACHINES:
         print(machine_times(gough.Platform.load(name), count))
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import gough
-from gough.fk.bulk import cores
+from gough.kernel.threads import cores
 
 POSES = 1_000_000
 GOAL = 1e-12

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 import chromium
 
 import gough
-from gough.fk.bulk import cores
+from gough.kernel.threads import cores
 from gough.view.viewer import Viewer
 
 MACHINES = ("reference", "reachy_mini", "rubin_camera")

@@ -12,7 +12,7 @@ from hypothesis import given
 from support import BATCHES, random_platforms
 
 import gough
-from gough.html import SHOWN, page
+from gough.text import SHOWN, page
 
 PLATFORM = gough.Platform.load("reference")
 POSES = PLATFORM.sample_poses(40, seed=2)

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gough import GoughError, Platform, PlatformError, Pose, RotaryArms, Workspace, leg_lengths
-from gough.platform_toml import catalog_text, from_toml
+from gough.platform_file import catalog_text, from_toml
 
 CATALOG = Platform.catalog()
 REFERENCE = Platform.load("reference")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import subprocess
 import sys
 import tomllib
@@ -29,20 +31,21 @@ def fresh_python(code: str) -> str:
 def test_every_public_name_resolves(name: str) -> None:
     value = getattr(gough, name)
     assert value is not None
-    assert name in dir(gough)
+    assert name in dir(gough) or name == "__version__"  # `dir` lists what loads when used
     if name != "__version__":
         assert value.__doc__, f"{name} has no docstring"
 
 
-def test_public_names_are_those_that_type_checkers_see() -> None:
-    """The imports under TYPE_CHECKING, run here, give the very objects that users get."""
-    text = Path(gough.__file__).read_text("utf-8")
-    block = text.split("if TYPE_CHECKING:\n")[1].split("\n\n")[0]
-    seen: dict = {}
-    exec("if True:\n" + block, seen)
-    seen.pop("__builtins__")
-    assert seen.keys() | {"__version__"} == set(gough.__all__)
-    assert all(getattr(gough, name) is value for name, value in seen.items())
+@pytest.mark.parametrize("package", ["gough", "gough.learn"])
+def test_public_names_are_those_that_type_checkers_see(package: str) -> None:
+    """Each import of the stub, run here, gives the very object that users get."""
+    home = importlib.import_module(package)
+    stub = ast.parse(Path(str(home.__file__)).with_suffix(".pyi").read_text("utf-8"))
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    names = {alias.name: f"{package}.{node.module}" for node in imports for alias in node.names}
+    assert names.keys() == set(home.__all__) - {"__version__"}
+    for name, module in names.items():
+        assert getattr(home, name) is getattr(importlib.import_module(module), name)
 
 
 def test_every_public_name_is_in_the_documents() -> None:
@@ -52,7 +55,7 @@ def test_every_public_name_is_in_the_documents() -> None:
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="module 'gough' has no attribute 'sovle'"):
+    with pytest.raises(AttributeError, match="No gough attribute sovle"):
         gough.sovle  # noqa: B018 # pyright: ignore[reportAttributeAccessIssue]
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gough import Pose
-from gough.fk.status import USABLE, Solution, Status
+from gough.fk.solution import Solution
+from gough.status import USABLE, Status
 
 
 @pytest.mark.parametrize("status", Status)

@@ -22,7 +22,7 @@ from support import assert_same_pose, random_platforms, random_poses, seeds
 
 import gough
 from gough.columns import DEVIATIONS, EULER, EULER_DEG, LEGS, POSITION, QUATERNION
-from gough.fk.frame import solution_columns
+from gough.fk.solution import solution_columns
 from gough.tables import as_readings
 
 PLATFORM = gough.Platform.load("reference")

@@ -15,7 +15,7 @@ import time
 import numpy as np
 
 import gough
-from gough.fk.jit import jit
+from gough.kernel.jit import jit
 from gough.kinematics import equivalent_struts
 from gough.modes.finish import legs_at, solve6, turn_and_shift
 from gough.modes.frames import Frames

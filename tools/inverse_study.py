@@ -19,9 +19,9 @@ from torch import Tensor
 
 from gough import Platform, Pose, leg_lengths
 from gough.learn import se3
-from gough.learn.batched_newton import REGULAR, batched_newton
-from gough.learn.geometry import TorchPlatform
 from gough.learn.inverse import approximate_inverse, first_inverse, next_inverse
+from gough.learn.kinematics import TorchPlatform
+from gough.learn.newton import REGULAR, batched_newton
 
 F_MAX = 20
 ENOUGH = torch.finfo(torch.float64).eps ** 0.5

@@ -9,7 +9,8 @@ from contextlib import suppress
 from importlib import import_module
 
 import gough
-from gough.commands import COMMANDS, stopping
+from gough.commands import COMMANDS
+from gough.commands import signals as stopping
 from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141

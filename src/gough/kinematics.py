@@ -1,12 +1,7 @@
 """Leg readings of a pose, their derivative, and how far the pose is from a singularity.
 
-Every kind of leg is a telescopic strut seen differently. With pose (t, R), pivot c, base
-joint b_i and platform joint p_i the strut is
-
-    d_i = R (p_i - c) + c + t - b_i,        length |d_i|
-
-and its length changes with the twist (v, w) of the pose -- v the velocity of the pivot, w
-the angular velocity, both in base coordinates -- as
+The struts d_i stand in `gough.struts`. A strut's length changes with the twist (v, w) of the pose
+-- v the velocity of the pivot, w the angular velocity, both in base coordinates -- as
 
     d|d_i| = n_i . v + (R (p_i - c) x n_i) . w,        n_i = d_i / |d_i|
 
@@ -18,16 +13,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough import struts
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
-from gough.pose import Pose
-from gough.tables import Table, as_pose, as_readings
+from gough.pose import Pose, as_pose
+from gough.tables import Table, as_readings
 
 
 def joint_positions(platform: Platform, pose: Pose) -> Array:
     """Platform joints in base coordinates (..., 6, 3) [platform unit]."""
-    return _arms(platform, pose) + (platform.pivot_point + pose.position)[..., None, :]
+    return struts.joints(platform.moving, platform.pivot_point, pose.position, pose.rotation)
 
 
 def strut_vectors(platform: Platform, pose: Pose) -> Array:
@@ -52,11 +48,8 @@ def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
     Raises:
         GoughError: neither poses nor a table, or a table with other columns.
     """
-    pose = as_pose(pose)
-    if platform.rotary is not None:
-        return _motor_angles(platform, pose)
-    lengths = np.linalg.norm(strut_vectors(platform, pose), axis=-1)
-    return lengths - platform.home_lengths if platform.legs == "length_change" else lengths
+    vectors = strut_vectors(platform, as_pose(pose))
+    return struts.readings(vectors, platform.zero_lengths, platform.rotary)
 
 
 def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Array, Array]:
@@ -68,13 +61,9 @@ def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Arra
     Returns:
         Base joints (..., 6, 3) and strut lengths (..., 6) [platform unit].
     """
-    readings = as_readings(legs)
-    if platform.rotary is not None:
-        arms = platform.rotary
-        tips = platform.base + arms.arm_length * _arm_directions(platform, readings)[0]
-        return tips, np.full(readings.shape, arms.rod_length)
-    lengths = readings + platform.home_lengths if platform.legs == "length_change" else readings
-    return np.broadcast_to(platform.base, (*readings.shape, 3)), lengths
+    return struts.equivalent(
+        platform.base, platform.zero_lengths, platform.rotary, as_readings(legs)
+    )
 
 
 def jacobian(platform: Platform, pose: Pose) -> Array:
@@ -84,8 +73,8 @@ def jacobian(platform: Platform, pose: Pose) -> Array:
     coordinates. Units: 1 and [platform unit / rad], or [rad / platform unit] and 1 for rotary
     legs, whose rows are NaN where the motor cannot reach and infinite where arm and rod align.
     """
-    struts, rates = _struts_and_rates(platform, pose)
-    rows = np.concatenate([struts, np.cross(_arms(platform, pose), struts)], axis=-1)
+    rods, rates = struts.rods_and_rates(strut_vectors(platform, pose), platform.rotary)
+    rows = np.concatenate([rods, np.cross(_levers(platform, pose), rods)], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return rows / rates[..., None]
 
@@ -117,11 +106,11 @@ def assembly_sign(platform: Platform, pose: Pose) -> Array:
 
 def normalised_jacobian(platform: Platform, pose: Pose) -> Array:
     """Rows (n_i, m_i) without units, (..., 6, 6); see `singularity_distance`."""
-    struts, _ = _struts_and_rates(platform, pose)
-    directions = struts / np.linalg.norm(struts, axis=-1, keepdims=True)
-    arms = _arms(platform, pose)
-    arms = arms - arms.mean(axis=-2, keepdims=True)
-    return np.concatenate([directions, np.cross(arms, directions) / joint_radius(platform)], -1)
+    rods, _ = struts.rods_and_rates(strut_vectors(platform, pose), platform.rotary)
+    directions = rods / np.linalg.norm(rods, axis=-1, keepdims=True)
+    levers = _levers(platform, pose)
+    levers = levers - levers.mean(axis=-2, keepdims=True)
+    return np.concatenate([directions, np.cross(levers, directions) / joint_radius(platform)], -1)
 
 
 def _finite_rows(matrices: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -182,46 +171,6 @@ def _leg_covariance(leg_noise: ArrayLike) -> Array:
     return noise
 
 
-def _arms(platform: Platform, pose: Pose) -> Array:
-    """R (p_i - c), from pivot to platform joints in base directions, (..., 6, 3)."""
-    return (platform.moving - platform.pivot_point) @ np.swapaxes(pose.rotation, -1, -2)
-
-
-def _arm_directions(platform: Platform, angles: Array) -> tuple[Array, Array]:
-    """Unit vectors along the motor arms, and their derivative, each (..., 6, 3)."""
-    assert platform.rotary is not None
-    x, y = platform.rotary.axis_x, platform.rotary.axis_y
-    cos, sin = np.cos(angles)[..., None], np.sin(angles)[..., None]
-    return cos * x + sin * y, cos * y - sin * x
-
-
-def _struts_and_rates(platform: Platform, pose: Pose) -> tuple[Array, Array]:
-    """Struts (..., 6, 3), and what their rows are divided by to give d reading / d twist.
-
-    A telescopic reading changes by d . dP / |d|. A rotary one keeps |P - tip(q)|, so
-    d . (dP - tip'(q) dq) = 0 and dq = d . dP / (d . tip'(q)).
-    """
-    struts = strut_vectors(platform, pose)
-    if platform.rotary is None:
-        return struts, np.linalg.norm(struts, axis=-1)
-    arm, slope = _arm_directions(platform, _motor_angles(platform, pose))
-    length = platform.rotary.arm_length
-    rods = struts - length * arm
-    return rods, length * np.sum(rods * slope, axis=-1)
-
-
-def _motor_angles(platform: Platform, pose: Pose) -> Array:
-    """Angles whose arm tips are one rod length from the platform joints, (..., 6) [rad].
-
-    With (x, y) the joint in the arm's plane, h = |(x, y)|, D its distance from the centre:
-    |joint - tip|^2 = rod^2 becomes 2 a h cos(q - atan2(y, x)) = D^2 + a^2 - rod^2.
-    """
-    arms = platform.rotary
-    assert arms is not None
-    joint = strut_vectors(platform, pose)
-    x, y = np.sum(joint * arms.axis_x, axis=-1), np.sum(joint * arms.axis_y, axis=-1)
-    reach = 2 * arms.arm_length * np.hypot(x, y)
-    wanted = np.sum(joint**2, axis=-1) + arms.arm_length**2 - arms.rod_length**2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        angle = np.arctan2(y, x) + arms.branch * np.arccos(wanted / reach)
-    return np.arctan2(np.sin(angle), np.cos(angle))
+def _levers(platform: Platform, pose: Pose) -> Array:
+    """Levers from the pivot to the platform joints, in base directions (..., 6, 3)."""
+    return struts.levers(platform.moving, platform.pivot_point, pose.rotation)

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough import struts
 from gough.checks import Array, frozen, platform_field, platform_numbers
 from gough.errors import PlatformError
 from gough.pose import Pose
 from gough.rotary import RotaryArms
+from gough.text import page, vector
 from gough.workspace import Workspace
 
 LegKind = Literal["telescopic", "length_change", "rotary"]
@@ -109,26 +111,26 @@ class Platform:
         Raises:
             PlatformError: no such name or file, or a field that is missing or wrong.
         """
-        from gough.platform_toml import load
+        from gough.platform_file import load
 
         return load(name_or_path)
 
     @staticmethod
     def catalog() -> list[str]:
         """Names of the machines that come with the package."""
-        from gough.platform_toml import catalog_names
+        from gough.platform_file import catalog_names
 
         return catalog_names()
 
     def to_toml(self) -> str:
         """This platform as TOML text; `load` of it gives an equal platform."""
-        from gough.platform_toml import to_toml
+        from gough.platform_file import to_toml
 
         return to_toml(self)
 
     def save(self, path: str | Path) -> None:
         """Write `to_toml()` to a file, which appears whole or not at all."""
-        from gough.platform_toml import save
+        from gough.platform_file import save
 
         save(self, path)
 
@@ -142,16 +144,17 @@ class Platform:
     @cached_property
     def home_lengths(self) -> Array:
         """Distance between the two joints of each leg at home, (6,) [platform unit]."""
-        from gough.kinematics import strut_vectors
+        return frozen(np.linalg.norm(self._home_struts(), axis=-1))
 
-        return frozen(np.linalg.norm(strut_vectors(self, self.home), axis=-1))
+    @cached_property
+    def zero_lengths(self) -> Array:
+        """Length at which a leg reads 0, (6,) [platform unit]; zeros but for length changes."""
+        return self.home_lengths if self.legs == "length_change" else frozen(np.zeros(6))
 
     @cached_property
     def home_legs(self) -> Array:
         """Readings at home (6,), which are lengths, zeros (length_change) or angles [rad]."""
-        from gough.kinematics import leg_lengths
-
-        return frozen(leg_lengths(self, self.home))
+        return frozen(struts.readings(self._home_struts(), self.zero_lengths, self.rotary))
 
     @cached_property
     def size(self) -> float:
@@ -229,7 +232,11 @@ class Platform:
     # ---- checks -----------------------------------------------------------------------
 
     def _moving_at_home(self) -> Array:
-        return self.home.apply(self.moving - self.pivot_point) + self.pivot_point
+        home = self.home
+        return struts.joints(self.moving, self.pivot_point, home.position, home.rotation)
+
+    def _home_struts(self) -> Array:
+        return self._moving_at_home() - self.base
 
     def _check_coincident_joints(self) -> None:
         at_home = self._moving_at_home()
@@ -299,8 +306,6 @@ class Platform:
         return f"Platform({self.name!r}, {self.legs} legs, size {self.size:.4g} [{unit}])"
 
     def _repr_html_(self) -> str:
-        from gough.html import page, platform_notes, vector
-
         unit = self.unit or "unit not named"
         reading = "rad" if self.legs == "rotary" else unit
         heads = ["leg", f"base joint [{unit}]", f"platform joint [{unit}]", f"home [{reading}]"]
@@ -308,7 +313,22 @@ class Platform:
         stroke = [] if self.stroke is None else [f"stroke [{reading}]"]
         limits = [] if self.stroke is None else [[vector(pair, " to ") for pair in self.stroke]]
         rows = zip("123456", *columns, *limits, strict=True)
-        return page(repr(self), heads + stroke, rows, platform_notes(self))
+        return page(repr(self), heads + stroke, rows, self._notes())
+
+    def _notes(self) -> list[str]:
+        """Home, pivot and workspace, a sentence each."""
+        unit = self.unit or "unit not named"
+        angles = vector(np.degrees(self.home.euler))
+        notes = [f"home: {vector(self.home.position)} [{unit}], rotated by {angles} [deg]"]
+        if self.pivot is not None:
+            notes.append(f"pivot: {vector(self.pivot)} [{unit}]")
+        if self.workspace is not None:
+            axes = ("x", "y", "z", "rx", "ry", "rz")
+            sides = [*self.workspace.translation, *self.workspace.rotation_deg]
+            ranges = zip(axes, sides, [unit] * 3 + ["deg"] * 3, strict=True)
+            listed = "; ".join(f"{axis} {vector(side, ' to ')} [{u}]" for axis, side, u in ranges)
+            notes.append(f"workspace from home: {listed}")
+        return notes
 
 
 def _joints(name: str, value: ArrayLike) -> Array:

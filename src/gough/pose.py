@@ -6,23 +6,25 @@ vectors; Euler angles are the paper's, R = Rx(a) Ry(b) Rz(c).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gough import quaternion, tables
 from gough.checks import LARGEST, Array, as_batch
+from gough.columns import EULER_DEG, QUATERNION, Angles, pose_names
 from gough.errors import GoughError
+from gough.tables import Kind, Table
+from gough.text import number, page, pose_heads, rows_of
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from scipy.spatial.transform import Rotation
 
-    from gough.columns import Angles
-    from gough.tables import Kind, Table
-
-CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # times a quaternion: the inverse rotation
-SERIES_ANGLE = 0.3  # [rad] below it, series whose first dropped term is under 1e-15
+UNIT_LENGTH = 1e-3  # a quaternion whose length is farther from 1 is taken for a mistake
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -75,7 +77,7 @@ class Pose:
     @classmethod
     def from_rotation(cls, position: ArrayLike, rotation: ArrayLike) -> Pose:
         """From (..., 3) and rotation matrices (..., 3, 3)."""
-        return cls(position, matrix_to_wxyz(as_batch("rotation", rotation, (3, 3))))
+        return cls(position, quaternion.from_matrix(as_batch("rotation", rotation, (3, 3))))
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Pose:
@@ -86,21 +88,12 @@ class Pose:
     @classmethod
     def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
         """From (..., 3) and Euler angles (..., 3) [rad], R = Rx(a) Ry(b) Rz(c)."""
-        half = as_batch("angles", angles, (3,)) / 2
-        (ca, cb, cc), (sa, sb, sc) = (
-            np.moveaxis(np.cos(half), -1, 0),
-            np.moveaxis(np.sin(half), -1, 0),
-        )
-        w = ca * cb * cc - sa * sb * sc
-        x = sa * cb * cc + ca * sb * sc
-        y = ca * sb * cc - sa * cb * sc
-        z = ca * cb * sc + sa * sb * cc
-        return cls(position, np.stack([w, x, y, z], axis=-1))
+        return cls(position, quaternion.from_euler(as_batch("angles", angles, (3,))))
 
     @classmethod
     def from_rotation_vector(cls, position: ArrayLike, vector: ArrayLike) -> Pose:
         """From (..., 3) and rotation vectors (..., 3) [rad] (axis times angle)."""
-        return cls(position, rotation_vector_to_wxyz(as_batch("vector", vector, (3,))))
+        return cls(position, quaternion.from_rotation_vector(as_batch("vector", vector, (3,))))
 
     @classmethod
     def exp(cls, twist: ArrayLike) -> Pose:
@@ -110,10 +103,10 @@ class Pose:
         """
         xi = as_batch("twist", twist, (6,))
         rho, omega = xi[..., :3], xi[..., 3:]
-        a, b = _left_jacobian_terms(np.linalg.norm(omega, axis=-1)[..., None])
+        a, b = quaternion.left_jacobian_terms(np.linalg.norm(omega, axis=-1)[..., None])
         once = np.cross(omega, rho)
         position = rho + a * once + b * np.cross(omega, once)
-        return cls(position, rotation_vector_to_wxyz(omega))
+        return cls(position, quaternion.from_rotation_vector(omega))
 
     @classmethod
     def from_rpy(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
@@ -123,8 +116,8 @@ class Pose:
         mean by it. It is not `from_euler`, whose turns come in the other order.
         """
         rpy = as_batch("angles", angles, (3,))
-        mirrored = cls.from_euler(np.zeros(3), -rpy)  # Rx(-r) Ry(-p) Rz(-y), the inverse
-        return cls(position, mirrored.wxyz * CONJUGATE)
+        inverse = quaternion.from_euler(-rpy)  # Rx(-r) Ry(-p) Rz(-y)
+        return cls(position, quaternion.conjugate(inverse))
 
     @classmethod
     def from_scipy(cls, position: ArrayLike, rotation: Rotation) -> Pose:
@@ -142,8 +135,6 @@ class Pose:
         Raises:
             GoughError: no table. InputError: other columns, or no numbers in them.
         """
-        from gough.tables import as_pose
-
         return as_pose(frame)
 
     # ---- seen as ----------------------------------------------------------------------
@@ -151,7 +142,7 @@ class Pose:
     @property
     def rotation(self) -> Array:
         """Rotation matrices (..., 3, 3)."""
-        return wxyz_to_matrix(self.wxyz)
+        return quaternion.to_matrix(self.wxyz)
 
     @property
     def matrix(self) -> Array:
@@ -164,20 +155,8 @@ class Pose:
 
     @property
     def euler(self) -> Array:
-        """Euler angles (..., 3) [rad] with R = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2].
-
-        From half the sum and half the difference of a and c, so that the angles describe the
-        rotation to rounding at b = +-pi/2 too, where only one of the two is determined
-        (Bernardes and Viollet 2022).
-        """
-        w, x, y, z = np.moveaxis(self.wxyz, -1, 0)
-        plus, minus = np.arctan2(x + z, w + y), np.arctan2(x - z, w - y)
-        b = 2 * np.arctan2(np.hypot(w + y, x + z), np.hypot(w - y, x - z)) - np.pi / 2
-        a, c = (
-            angle - 2 * np.pi * np.round(angle / (2 * np.pi))
-            for angle in (plus + minus, plus - minus)
-        )
-        return np.stack([a, b, c], axis=-1)
+        """Euler angles (..., 3) [rad] with R = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2]."""
+        return quaternion.to_euler(self.wxyz)
 
     @property
     def rpy(self) -> Array:
@@ -186,7 +165,7 @@ class Pose:
         At pitch +-pi/2 only the sum or the difference of the others is determined; the angles
         describe the rotation there, too.
         """
-        return -Pose(np.zeros(3), self.wxyz * CONJUGATE).euler
+        return -quaternion.to_euler(quaternion.conjugate(self.wxyz))
 
     def as_scipy(self) -> Rotation:
         """The rotations as a `scipy.spatial.transform.Rotation`; the position is not in it.
@@ -206,17 +185,13 @@ class Pose:
     @property
     def rotation_vector(self) -> Array:
         """Rotation vectors (..., 3) [rad], angle in [0, pi]."""
-        q = np.where(self.wxyz[..., :1] < 0, -self.wxyz, self.wxyz)
-        sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-        angle = 2 * np.arctan2(sine, q[..., :1])
-        small = sine < 1e-8  # there angle / sine is 2 to rounding
-        return q[..., 1:] * np.where(small, 2.0, angle / np.where(small, 1.0, sine))
+        return quaternion.to_rotation_vector(self.wxyz)
 
     def log(self) -> Array:
         """SE(3) logarithm: twists (..., 6) = (rho [unit], omega [rad]); inverse of `exp`."""
         omega = self.rotation_vector
         angle = np.linalg.norm(omega, axis=-1)[..., None]
-        second = _inverse_left_jacobian_term(angle)
+        second = quaternion.inverse_left_jacobian_term(angle)
         once = np.cross(omega, self.position)
         rho = self.position - once / 2 + second * np.cross(omega, once)
         return np.concatenate([rho, omega], axis=-1)
@@ -257,9 +232,7 @@ class Pose:
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
         """
-        from gough.tables import make_frame, pose_table
-
-        return make_frame(pose_table(self, angles), kind)
+        return tables.make_frame(pose_table(self, angles), kind)
 
     def copy(self) -> Pose:
         """A pose with arrays of its own."""
@@ -267,18 +240,17 @@ class Pose:
 
     def inverse(self) -> Pose:
         """The pose that undoes this one."""
-        conj = self.wxyz * CONJUGATE
-        return Pose(-(wxyz_to_matrix(conj) @ self.position[..., None])[..., 0], conj)
+        wxyz = quaternion.conjugate(self.wxyz)
+        return Pose(-(quaternion.to_matrix(wxyz) @ self.position[..., None])[..., 0], wxyz)
 
     def __matmul__(self, other: Pose) -> Pose:
         """First `other`, then this one."""
-        return Pose(self.apply(other.position), wxyz_product(self.wxyz, other.wxyz))
+        return Pose(self.apply(other.position), quaternion.product(self.wxyz, other.wxyz))
 
     def distance(self, other: Pose) -> tuple[Array, Array]:
         """Distance of positions (...) [unit] and angle between orientations (...) [rad]."""
-        shift = np.linalg.norm(self.position - other.position, axis=-1)
-        turn = wxyz_product(self.wxyz * CONJUGATE, other.wxyz)
-        return shift, 2 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
+        length = np.linalg.norm(self.position - other.position, axis=-1)
+        return length, quaternion.angle_between(self.wxyz, other.wxyz)
 
     def __repr__(self) -> str:
         if self.batch:
@@ -287,8 +259,6 @@ class Pose:
         return f"Pose(position=({numbers[0]}), wxyz=({numbers[1]}))"
 
     def _repr_html_(self) -> str:
-        from gough.html import page, pose_cells, pose_heads, rows_of
-
         count = "one pose" if not self.batch else f"{len(self.position.reshape(-1, 3)):,} poses"
         rows = rows_of(self.batch, lambda i: pose_cells(self[i] if i else self))
         return page(f"Pose: {count}", pose_heads(self.batch, ""), rows)
@@ -301,72 +271,66 @@ def _no_rotation(wxyz: Array, norm: Array) -> str:
     return f"wxyz: expected a quaternion of about unit length, found {found}"
 
 
-def wxyz_product(a: Array, b: Array) -> Array:
-    """Hamilton product of quaternions (..., 4)."""
-    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
-    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
-    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+def as_pose(pose: Pose | Table) -> Pose:
+    """Return poses as they are, or read them from a table: columns as in `gough.files`, batch (N,).
 
+    Rows with absent values, or whose quaternion is not of unit length, are NaN throughout.
 
-def wxyz_to_matrix(wxyz: Array) -> Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    w, x, y, z = np.moveaxis(wxyz, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def matrix_to_wxyz(rotation: Array) -> Array:
-    """Unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
-
-    The largest of the four squared components is the divisor, so no case loses digits
-    (Shepperd 1978).
+    Raises:
+        GoughError: neither poses nor a table. InputError: other columns, or no numbers in them.
     """
-    m = rotation
-    trace = np.trace(m, axis1=-2, axis2=-1)
-    diagonal = np.diagonal(m, axis1=-2, axis2=-1)
-    # four times the squares of w, x, y, z
-    squares = np.concatenate([(1 + trace)[..., None], 1 + 2 * diagonal - trace[..., None]], -1)
-    a, b, c = m[..., 2, 1], m[..., 0, 2], m[..., 1, 0]
-    d, e, f = m[..., 1, 2], m[..., 2, 0], m[..., 0, 1]
-    s0, s1, s2, s3 = np.moveaxis(squares, -1, 0)
-    candidates = np.stack(
-        [
-            np.stack([s0, a - d, b - e, c - f], axis=-1),
-            np.stack([a - d, s1, c + f, b + e], axis=-1),
-            np.stack([b - e, c + f, s2, a + d], axis=-1),
-            np.stack([c - f, b + e, a + d, s3], axis=-1),
-        ],
-        axis=-2,
-    )
-    best = np.argmax(squares, axis=-1)[..., None, None]
-    q = np.take_along_axis(candidates, best, axis=-2)[..., 0, :]
-    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.where(q[..., :1] < 0, -q, q)
+    if isinstance(pose, Pose):
+        return pose
+    return poses_from_columns(*tables.read_pose_columns(pose))[0]
 
 
-def rotation_vector_to_wxyz(vector: Array) -> Array:
-    """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
-    half = np.linalg.norm(vector, axis=-1, keepdims=True) / 2
-    # np.sinc(x) is sin(pi x) / (pi x) and is exact at zero
-    return np.concatenate([np.cos(half), vector / 2 * np.sinc(half / np.pi)], axis=-1)
+def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Callable[[int], str]]:
+    """Poses, NaN where a row is invalid, and a function that describes the fault of row i.
+
+    Args:
+        values: (N, 6) or (N, 7): position, then a quaternion or Euler angles.
+        names: the columns' names, which say what the values mean.
+    """
+    rotation = tuple(names[3:])
+    valid = np.all(np.isfinite(values), axis=-1)
+    if rotation == QUATERNION:
+        with np.errstate(over="ignore", invalid="ignore"):
+            length = np.linalg.norm(values[:, 3:], axis=-1)
+        valid &= np.abs(length - 1) <= UNIT_LENGTH
+
+    def reason(i: int) -> str:
+        for name, value in zip(names, values[i], strict=True):
+            if not np.isfinite(value):
+                found = "empty or not a number" if np.isnan(value) else value
+                return f"{name} is {found}, expected a finite number"
+        length = np.linalg.norm(values[i, 3:])
+        return f"the quaternion's length is {length:.6g}, expected 1"
+
+    clean = np.where(valid[:, None], values, np.nan)
+    position, turn = clean[:, :3], clean[:, 3:]
+    if rotation == QUATERNION:
+        return Pose(position, turn), reason
+    return Pose.from_euler(position, np.radians(turn) if rotation == EULER_DEG else turn), reason
 
 
-def _left_jacobian_terms(angle: Array) -> tuple[Array, Array]:
-    """(1 - cos) / angle^2 and (angle - sin) / angle^3, neither losing digits near zero."""
-    small = angle < SERIES_ANGLE
-    t, t2 = np.where(small, 1.0, angle), angle * angle
-    series = 1 / 6 - t2 / 120 * (1 - t2 / 42 * (1 - t2 / 72 * (1 - t2 / 110)))
-    b = np.where(small, series, (t - np.sin(t)) / t**3)
-    return np.sinc(angle / (2 * np.pi)) ** 2 / 2, b
+def pose_values(pose: Pose, angles: Angles | None) -> Array:
+    """Values of the columns `pose_names(angles)`, (N, 7) or (N, 6), batch axes flattened."""
+    names = pose_names(angles)
+    rotation = pose.wxyz if angles is None else pose.euler
+    if angles == "deg":
+        rotation = np.degrees(rotation)
+    return np.concatenate([pose.position, rotation], axis=-1).reshape(-1, len(names))
 
 
-def _inverse_left_jacobian_term(angle: Array) -> Array:
-    """(1 - (angle / 2) cot(angle / 2)) / angle^2, which tends to 1/12."""
-    small = angle < SERIES_ANGLE
-    t, t2 = np.where(small, 1.0, angle), angle * angle
-    series = 1 / 12 + t2 / 720 * (1 + t2 / 42 * (1 + t2 / 40 * (1 + t2 * 30240 / 1197504)))
-    return np.where(small, series, (1 - t / 2 / np.tan(t / 2)) / t**2)
+def pose_table(pose: Pose, angles: Angles | None) -> dict[str, pa.Array]:
+    """Columns of poses by name, batch axes flattened."""
+    from gough.arrow import number_column
+
+    columns = map(number_column, pose_values(pose, angles).T)
+    return dict(zip(pose_names(angles), columns, strict=True))
+
+
+def pose_cells(pose: Pose) -> list[str]:
+    """Position and Euler angles of one pose as text, R = Rx Ry Rz, the angles in degrees."""
+    numbers = [number(v, ".7g") for v in pose.position]
+    return numbers + [number(v, ".4f") for v in np.degrees(pose.euler)]

@@ -7,7 +7,7 @@ the order of its columns. A value that is absent becomes NaN, and so a row witho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -15,24 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gough.checks import Array, as_batch
-from gough.columns import (
-    EULER_DEG,
-    LEGS,
-    QUATERNION,
-    Angles,
-    leg_columns,
-    pose_columns,
-    pose_names,
-)
+from gough.columns import LEGS, leg_columns, pose_columns
 from gough.errors import GoughError, InputError
-from gough.pose import Pose
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 Table = Any  # with named columns; which types these are is for their libraries to say
 Kind = Literal["pandas", "polars", "pyarrow"]
-UNIT_LENGTH = 1e-3  # a quaternion whose length is farther from 1 is taken for a mistake
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,53 +65,20 @@ def as_readings(legs: ArrayLike | Table) -> Array:
     return as_batch("legs", legs, (6,))
 
 
-def as_pose(pose: Pose | Table) -> Pose:
-    """Poses from poses, or from a table of them: columns as in `gough.files`, batch (N,).
-
-    Rows with absent values, or whose quaternion is not of unit length, are NaN throughout.
+def read_pose_columns(table: Table) -> tuple[Array, tuple[str, ...]]:
+    """Values (N, 6) or (N, 7) of the pose columns of a table, and the columns' names.
 
     Raises:
-        GoughError: neither poses nor a table. InputError: other columns, or no numbers in them.
+        GoughError: not a table. InputError: other columns, or no numbers in them.
     """
-    if isinstance(pose, Pose):
-        return pose
-    found = column_names(pose)
+    found = column_names(table)
     if found is None:
         raise GoughError(
             f"pose: expected a Pose or a table with columns x, y, z and a rotation; found "
-            f"{type(pose).__name__}"
+            f"{type(table).__name__}"
         )
     names = pose_columns("pose", found)
-    return poses_from_columns(_numbers("pose", pose, names), names)[0]
-
-
-def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Callable[[int], str]]:
-    """Poses, NaN where a row is none, and a function that says what is wrong with row i.
-
-    Args:
-        values: (N, 6) or (N, 7): position, then a quaternion or Euler angles.
-        names: the columns' names, which say what the values mean.
-    """
-    rotation = tuple(names[3:])
-    valid = np.all(np.isfinite(values), axis=-1)
-    if rotation == QUATERNION:
-        with np.errstate(over="ignore", invalid="ignore"):
-            length = np.linalg.norm(values[:, 3:], axis=-1)
-        valid &= np.abs(length - 1) <= UNIT_LENGTH
-
-    def reason(i: int) -> str:
-        for name, value in zip(names, values[i], strict=True):
-            if not np.isfinite(value):
-                found = "empty or not a number" if np.isnan(value) else value
-                return f"{name} is {found}, expected a finite number"
-        length = np.linalg.norm(values[i, 3:])
-        return f"the quaternion's length is {length:.6g}, expected 1"
-
-    clean = np.where(valid[:, None], values, np.nan)
-    position, turn = clean[:, :3], clean[:, 3:]
-    if rotation == QUATERNION:
-        return Pose(position, turn), reason
-    return Pose.from_euler(position, np.radians(turn) if rotation == EULER_DEG else turn), reason
+    return _numbers("pose", table, names), names
 
 
 def origin(value: object) -> Origin | None:
@@ -223,23 +180,6 @@ def _put(out: Array, column: np.ndarray | pa.ChunkedArray | pa.Array) -> None:
 
 
 # ---- out ------------------------------------------------------------------------------
-
-
-def pose_values(pose: Pose, angles: Angles | None) -> Array:
-    """What stands in the columns `pose_names(angles)`, (N, 7) or (N, 6), batch axes flattened."""
-    names = pose_names(angles)
-    turn = pose.wxyz if angles is None else pose.euler
-    if angles == "deg":
-        turn = np.degrees(turn)
-    return np.concatenate([pose.position, turn], axis=-1).reshape(-1, len(names))
-
-
-def pose_table(pose: Pose, angles: Angles | None) -> dict[str, pa.Array]:
-    """The columns of poses, batch axes flattened."""
-    from gough.arrow import number_column
-
-    columns = map(number_column, pose_values(pose, angles).T)
-    return dict(zip(pose_names(angles), columns, strict=True))
 
 
 def make_frame(

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough import quaternion
 from gough.checks import Array, platform_field, platform_numbers
 from gough.errors import PlatformError
-from gough.pose import Pose, wxyz_product
+from gough.pose import Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +64,12 @@ class Workspace:
         shift = rng.uniform(*self.translation.T, size=(count, 3))
         angles = np.radians(rng.uniform(*self.rotation_deg.T, size=(count, 3)))
         turn = Pose.from_euler(np.zeros(3), angles).wxyz
-        return Pose(home.position + shift, wxyz_product(home.wxyz, turn))
+        return Pose(home.position + shift, quaternion.product(home.wxyz, turn))
 
     def contains(self, home: Pose, pose: Pose, length: float, angle: float) -> NDArray[np.bool_]:
         """Whether poses (...) are in the box widened by `length` [unit] and `angle` [rad]."""
         conjugate = home.inverse().wxyz
-        turn = Pose(pose.position - home.position, wxyz_product(conjugate, pose.wxyz))
+        turn = Pose(pose.position - home.position, quaternion.product(conjugate, pose.wxyz))
         inside = np.ones(pose.batch, dtype=bool)
         for value, box, slack in (
             (turn.position, self.translation, length),

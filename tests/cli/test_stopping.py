@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from gough.commands import stopping
+from gough.commands import signals as stopping
 
 
 @pytest.fixture(autouse=True)

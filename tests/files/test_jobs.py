@@ -15,7 +15,7 @@ import gough
 from gough.columns import DEVIATIONS, EULER, EULER_DEG, LEGS, POSITION, QUATERNION
 from gough.errors import GoughError, InputError
 from gough.files import Reading, inverse_file, solve_file
-from gough.fk.status import Status
+from gough.status import Status
 
 
 def table(path) -> pa.Table:

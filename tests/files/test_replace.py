@@ -12,7 +12,7 @@ import sys
 import pytest
 
 from gough.errors import GoughError
-from gough.files.replace import replacing
+from gough.whole_file import replacing
 
 
 def test_the_new_file_takes_the_place_of_the_old_and_its_permissions(tmp_path):
@@ -83,7 +83,7 @@ def test_a_signal_right_after_the_file_is_made_leaves_nothing(tmp_path, monkeypa
         path.write_bytes(b"")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gough.files.replace._open_new", made_then_interrupted)
+    monkeypatch.setattr("gough.whole_file._open_new", made_then_interrupted)
     with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "poses.csv"):
         pass
     assert os.listdir(tmp_path) == []

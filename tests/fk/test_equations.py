@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
-from gough.fk import geometry, layout, linear
-from gough.fk.equations import eliminate, newton_step
-from gough.fk.jit import jit
+from gough.kernel import constants as geometry
+from gough.kernel import layout, linear
+from gough.kernel.equations import eliminate, newton_step
+from gough.kernel.jit import jit
 
 CATALOG = gough.Platform.catalog()
 
@@ -103,7 +104,7 @@ def test_a_settled_pose_stays_where_it_is():
 
 def _state(constants, platform, legs, pose):
     """A buffer of stride 1 with the struts of a reading and a pose."""
-    from gough.fk.readings import take_reading
+    from gough.kernel.pose_io import take_reading
 
     @jit(cache=False)
     def fill(constants, legs, buffer):

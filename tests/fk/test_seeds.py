@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import gough
-from gough.fk import cache, polynomial, seeds
+from gough.seeds import base as seeds
+from gough.seeds import cache, polynomial
 
 
 @pytest.fixture

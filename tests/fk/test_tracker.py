@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import gough
 from gough import Event, Status
-from gough.fk import geometry
+from gough.kernel import constants as geometry
 
 
 @pytest.fixture

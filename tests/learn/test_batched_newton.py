@@ -17,8 +17,9 @@ import gough
 from gough import GoughError, Platform, Pose
 from gough.kinematics import equivalent_struts
 from gough.learn import se3
-from gough.learn.batched_newton import BatchedSolution, Outcome, batched_newton, refine
-from gough.learn.geometry import TorchPlatform
+from gough.learn.kinematics import TorchPlatform
+from gough.learn.newton import BatchedSolution, batched_newton, refine
+from gough.status import NewtonStatus
 
 
 def problem(platform: Platform, count: int = 50, seed: int = 1, off: float = 1e-3):
@@ -110,7 +111,7 @@ def test_rotation_vectors_are_kept_short() -> None:
     assert long < 0.6
 
 
-def planted() -> tuple[Platform, Pose, np.ndarray, dict[int, Outcome]]:
+def planted() -> tuple[Platform, Pose, np.ndarray, dict[int, NewtonStatus]]:
     """Good rows with one of every bad kind between them."""
     platform = reference()
     _, legs, guess = problem(platform, count=12)
@@ -123,8 +124,8 @@ def planted() -> tuple[Platform, Pose, np.ndarray, dict[int, Outcome]]:
     legs[9] = np.inf
     legs[10] = 3000.0, 200, 3000, 200, 3000, 200  # no pose has these
     ends = {
-        1: Outcome.INVALID_INPUT, 3: Outcome.INVALID_INPUT, 5: Outcome.INVALID_INPUT,
-        7: Outcome.SINGULAR, 9: Outcome.INVALID_INPUT,
+        1: NewtonStatus.INVALID_INPUT, 3: NewtonStatus.INVALID_INPUT, 5: NewtonStatus.INVALID_INPUT,
+        7: NewtonStatus.SINGULAR, 9: NewtonStatus.INVALID_INPUT,
     }  # fmt: skip
     return platform, Pose.trusted(t, q), legs, ends
 
@@ -134,9 +135,9 @@ def test_bad_rows_are_told_one_by_one_and_spoil_no_other() -> None:
     end = batched_newton(platform, guess, legs)
     for k in range(len(legs)):
         if k == 10:
-            assert end.outcome[k] != Outcome.CONVERGED
+            assert end.outcome[k] != NewtonStatus.CONVERGED
         else:
-            assert end.outcome[k] == ends.get(k, Outcome.CONVERGED), k
+            assert end.outcome[k] == ends.get(k, NewtonStatus.CONVERGED), k
     assert np.array_equal(end.singular, [k == 7 or end.outcome[k] == 2 for k in range(12)])
     assert sum(end.counts().values()) == 12
     good = np.flatnonzero(end.converged)
@@ -146,7 +147,7 @@ def test_bad_rows_are_told_one_by_one_and_spoil_no_other() -> None:
     assert np.array_equal(alone.pose.wxyz, end.pose.wxyz[good])
     assert np.array_equal(alone.iterations, end.iterations[good])
     assert np.isnan(end.residual[[1, 3, 9]]).tolist() == [True, True, True]
-    invalid = end.outcome == Outcome.INVALID_INPUT
+    invalid = end.outcome == NewtonStatus.INVALID_INPUT
     assert np.array_equal(np.isnan(end.pose.position).all(axis=-1), invalid)
     assert np.array_equal(np.isnan(end.pose.wxyz).all(axis=-1), invalid)
 
@@ -157,7 +158,7 @@ def test_a_row_that_runs_away_is_stopped() -> None:
     _, legs, guess = problem(platform, count=2)
     far = guess.position + np.array([[0, 0, 1e5 * platform.size], [0, 0, 0]])
     end = batched_newton(platform, Pose(far, guess.wxyz), legs, f_max=200, scaled=True)
-    assert list(end.outcome) == [Outcome.DIVERGED, Outcome.CONVERGED]
+    assert list(end.outcome) == [NewtonStatus.DIVERGED, NewtonStatus.CONVERGED]
     assert end.iterations[0] == 0
     np.testing.assert_allclose(end.pose.position[0], far[0], rtol=0, atol=1e-8)
 
@@ -177,14 +178,14 @@ def test_limits_are_kept() -> None:
     platform = reference()
     _, legs, guess = problem(platform, off=1e-2)
     short = batched_newton(platform, guess, legs, z_max=1)
-    assert (short.outcome == Outcome.NOT_CONVERGED).all()
+    assert (short.outcome == NewtonStatus.NOT_CONVERGED).all()
     assert (short.iterations == 1).all()
     assert short.sweeps == 1
     none = batched_newton(platform, guess, legs, z_max=0)
     assert_at(platform, none, guess, 1e-13)
     assert none.sweeps == 0
     few = batched_newton(platform, guess, legs, f_max=5)
-    assert (few.outcome == Outcome.SINGULAR).all()
+    assert (few.outcome == NewtonStatus.SINGULAR).all()
     assert_at(platform, few, guess, 1e-13)
     assert batched_newton(platform, guess, legs, f_max=5, scaled=True).sweeps <= few.sweeps
 
@@ -289,8 +290,8 @@ def test_what_is_wrong_with_the_arguments_is_said() -> None:
 
 
 def test_every_outcome_has_its_sentence() -> None:
-    texts = [o.text for o in Outcome]
-    assert len(set(texts)) == len(Outcome)
+    texts = [o.text for o in NewtonStatus]
+    assert len(set(texts)) == len(NewtonStatus)
     assert all(t.endswith(".") for t in texts)
 
 

@@ -7,7 +7,7 @@ import tyro
 from learn.machines import reference
 
 from gough import GoughError
-from gough.learn import commands
+from gough.commands import learn as commands
 from gough.learn.config import PRESETS, TrainConfig
 
 

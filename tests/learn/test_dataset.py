@@ -8,8 +8,8 @@ import pytest
 from learn.machines import reference
 
 from gough import GoughError, Pose, assembly_sign, leg_lengths
-from gough.learn import dataset as module
-from gough.learn.dataset import DatasetSpec, chunks, dataset, write_dataset
+from gough.learn import data as module
+from gough.learn.data import DatasetSpec, chunks, dataset, write_dataset
 from gough.learn.graph import HexapodGraph
 
 

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from learn.machines import network, reference, tiny, with_model
 
 from gough import GoughError, Platform, leg_lengths
-from gough.fk.network import NetworkSeed, seal
 from gough.learn.checkpoint import save_tensors
 from gough.learn.export import WEIGHTS, export_run, facts_of, load_network, to_onnx
 from gough.learn.models import MODELS
+from gough.seeds.network import NetworkSeed, seal
 
 RECORD = {"seconds": 1.0, "steps": 20, "seed": 0}
 SIZES = {
@@ -67,7 +67,7 @@ def seed_range(seed, legs):
 def test_chunks_do_not_show(run, legs, monkeypatch):
     seed = NetworkSeed(reference(), run / "network.onnx")
     whole = seed.guess(legs)
-    monkeypatch.setattr("gough.fk.network.CHUNK", 7)
+    monkeypatch.setattr("gough.seeds.network.CHUNK", 7)
     np.testing.assert_allclose(seed.guess(legs).position, whole.position, atol=1e-4)
 
 

@@ -19,9 +19,10 @@ from torch.autograd import gradcheck, gradgradcheck
 import gough
 import gough.learn
 from gough import GoughError, Platform, PlatformError, Pose, Status
-from gough.learn.batched_newton import Outcome, refine
-from gough.learn.geometry import TorchPlatform
 from gough.learn.implicit import implicit_pose
+from gough.learn.kinematics import TorchPlatform
+from gough.learn.newton import refine
+from gough.status import NewtonStatus
 
 TOLERANCE: dict[str, Any] = {"eps": 1e-6, "atol": 1e-4, "rtol": 1e-4}
 
@@ -134,7 +135,7 @@ def refine_planted(legs: Tensor, base: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     platform, guess, _, _ = planted()
     start = torch.tensor(guess.position), torch.tensor(guess.rotation)
     end = refine(TorchPlatform(platform).with_joints(base), *start, legs)
-    return end.position, end.rotation, end.outcome == Outcome.CONVERGED
+    return end.position, end.rotation, end.outcome == NewtonStatus.CONVERGED
 
 
 @pytest.mark.parametrize("method", [solve_planted, refine_planted])

@@ -4,15 +4,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from learn.machines import reference
 
-from gough import GoughError, Pose, leg_lengths
+from gough import GoughError, Pose, leg_lengths, quaternion
 from gough.learn.metrics import measure
-from gough.learn.newton import outcome, refine
-from gough.pose import wxyz_product
+from gough.learn.outcomes import outcome, refine
 
 
 def off_by(pose: Pose, shift: float, degrees: float) -> Pose:
     turn = Pose.from_rotation_vector(np.zeros(3), [0, np.radians(degrees), 0])
-    return Pose(pose.position + np.array([shift, 0, 0]), wxyz_product(pose.wxyz, turn.wxyz))
+    return Pose(pose.position + np.array([shift, 0, 0]), quaternion.product(pose.wxyz, turn.wxyz))
 
 
 @settings(max_examples=30)

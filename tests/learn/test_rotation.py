@@ -3,10 +3,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gough.fk.network import nearest_rotations
-from gough.learn.geometry import euler_to_matrix
+from gough.learn.kinematics import euler_to_matrix
 from gough.learn.loss import matrix_to_euler
 from gough.learn.rotation import nearest_rotation
+from gough.seeds.network import nearest_rotations
 
 
 def by_svd(m):

@@ -3,17 +3,16 @@ import pytest
 import torch
 from learn.machines import reference, with_some_workspace
 
-from gough import GoughError, Platform, Pose, assembly_sign, leg_lengths
-from gough.learn.geometry import TorchPlatform, euler_to_matrix, quaternion_to_matrix
+from gough import GoughError, Platform, Pose, assembly_sign, leg_lengths, quaternion
+from gough.learn.kinematics import TorchPlatform, euler_to_matrix, quaternion_to_matrix
 from gough.learn.sampling import Stream
-from gough.pose import wxyz_product
 
 
 def as_pose(platform, batch) -> Pose:
     turn = Pose.from_rotation(np.zeros(3), batch.turn.numpy())
     return Pose(
         platform.home.position + batch.shift.numpy(),
-        wxyz_product(platform.home.wxyz, turn.wxyz),
+        quaternion.product(platform.home.wxyz, turn.wxyz),
     )
 
 

@@ -5,9 +5,9 @@ import pytest
 from learn.machines import reference
 
 from gough import GoughError, Platform, leg_lengths
-from gough.fk.network import NetworkSeed, shipped_names
 from gough.learn.evaluate import HELD_OUT, default_names, evaluate, held_out, table, to_json
 from gough.learn.speed import measure_speed
+from gough.seeds.network import NetworkSeed, shipped_names
 
 
 def test_names():

@@ -16,11 +16,11 @@ import torch
 from learn.machines import random_platform, reference, tiny, with_model
 
 from gough import GoughError, leg_lengths
-from gough.fk.network import NetworkSeed
 from gough.learn.checkpoint import load_tensors, save_tensors
 from gough.learn.config import PRESETS, DataConfig, RunConfig, TrainConfig, seconds
 from gough.learn.schedule import Clock, learning_rate
 from gough.learn.train import CHECKPOINT, Trainer, prepare, run, train
+from gough.seeds.network import NetworkSeed
 
 
 def metrics(folder: Path) -> list[dict[str, str]]:

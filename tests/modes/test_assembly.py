@@ -11,9 +11,9 @@ from modes.machines import ALL, TELESCOPIC, found, poses_of, random_platform
 import gough
 from gough.modes import assembly
 from gough.modes.follow import follow
-from gough.modes.result import ModesStatus
 from gough.modes.starts import find_start
 from gough.modes.study import distances
+from gough.status import ModesStatus
 
 
 @pytest.fixture(scope="module")

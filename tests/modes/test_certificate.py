@@ -7,9 +7,9 @@ import pytest
 from modes.machines import ALL, poses_of
 
 import gough
-from gough.fk.certificate import TURNS, _bulk_with, certify_batch
+from gough import quaternion
+from gough.certificate import TURNS, _bulk_with, certify_batch
 from gough.kinematics import equivalent_struts, joint_radius
-from gough.pose import wxyz_to_matrix
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -125,7 +125,7 @@ def test_small_pivots_are_noticed():
     balls = pytest.importorskip("gough.modes.balls")
     platform = gough.Platform.load("reference")
     pose = platform.sample_poses(60, 8)
-    axis = wxyz_to_matrix(TURNS[0])[0]  # the first pivot is the first strut's part along it
+    axis = quaternion.to_matrix(TURNS[0])[0]  # the first pivot is the first strut's part along it
     strut = gough.joint_positions(platform, pose)[:, 0] - platform.base[0]
     along = strut @ axis * (1 - np.logspace(-16, -1, 60))
     pose = gough.Pose(pose.position - along[:, None] * axis, pose.wxyz)

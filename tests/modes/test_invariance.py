@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from modes.machines import random_platform
 
 import gough
-from gough.pose import wxyz_product
+from gough import quaternion
 
 SEEDS = st.integers(0, 10**6)
 few = settings(max_examples=15, deadline=None)
@@ -36,8 +36,8 @@ def test_rigid_motion_of_both_frames(seed):
     )
     modes = gough.assembly_modes(platform, platform.home_legs)
     other = gough.assembly_modes(moved, platform.home_legs)
-    turned = wxyz_product(wxyz_product(np.broadcast_to(a.wxyz, (len(modes), 4)), modes.pose.wxyz),
-                          b.inverse().wxyz)  # fmt: skip
+    first = quaternion.product(np.broadcast_to(a.wxyz, (len(modes), 4)), modes.pose.wxyz)
+    turned = quaternion.product(first, b.inverse().wxyz)
     seen = gough.Pose(a.apply(modes.pose.apply(b.inverse().position)), turned)
     assert same(modes, other, seen)
 

@@ -7,12 +7,10 @@ import pytest
 from modes.machines import poses_of
 
 import gough
-from gough.fk.jit import jit
-from gough.fk.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
-from gough.modes.finish import repeated
-from gough.modes.follow import Parameters, follow
-from gough.modes.monodromy import gaussian
-from gough.modes.series import (
+from gough.kernel.jit import jit
+from gough.kernel.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
+from gough.kernel.paths import FINITE, STUCK
+from gough.kernel.series import (  # fmt: skip
     BASE,
     BASE_RATE,
     L2,
@@ -28,10 +26,12 @@ from gough.modes.series import (
     expand,
     factorise,
     substitute,
-)  # fmt: skip
+)
+from gough.modes.finish import repeated
+from gough.modes.follow import Parameters, follow
+from gough.modes.monodromy import gaussian
 from gough.modes.starts import start_of
 from gough.modes.study import distances, distinct, inverse, product, rotation, squared_lengths
-from gough.modes.tracker import FINITE, STUCK
 
 
 @jit(cache=False)

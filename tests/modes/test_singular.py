@@ -9,7 +9,7 @@ import pytest
 from modes.machines import griffis_duffy
 
 import gough
-from gough.modes.result import ModesStatus
+from gough.status import ModesStatus
 
 
 def similar_hexagons() -> gough.Platform:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import gough
-from gough.paper import join
-from gough.paper.join import Benchmark, benchmark, score
+from gough.paper import benchmark as join
+from gough.paper.benchmark import Benchmark, benchmark, score
 
 
 @pytest.fixture(scope="module")

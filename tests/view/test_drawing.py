@@ -8,8 +8,8 @@ from support import random_platform, scaled
 
 import gough
 from gough import Platform
+from gough.view import meshes as shapes
 from gough.view import server as servers
-from gough.view import shapes
 from gough.view.scene import Scene
 
 CATALOG = Platform.catalog()

@@ -8,7 +8,7 @@ from support import scaled
 
 import gough
 from gough import Platform, Pose
-from gough.fk.status import Status
+from gough.status import Status
 from gough.view import colors
 from gough.view.follow import BLOCKED, follow, has_pose
 from gough.view.model import STAYS, Answer, Model, pose_numbers

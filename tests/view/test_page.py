@@ -12,7 +12,7 @@ from PIL import Image
 
 import gough
 from gough import Platform
-from gough.fk.status import Status
+from gough.status import Status
 from gough.view.export import page as html_page
 from gough.view.model import STAYS, Model
 from gough.view.trajectory import read

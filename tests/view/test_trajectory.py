@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import gough
 from gough import GoughError, InputError, Platform
 from gough.files import Reading, inverse_file, solve_file
-from gough.fk.status import Status
+from gough.status import Status
 from gough.view.trajectory import ROWS_A_SECOND, Thin, read
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rubin_camera_legs.csv"

@@ -14,12 +14,12 @@ COMMANDS = {
     "inverse": ("gough.commands.inverse", "run", "leg readings from a file of poses"),
     "modes": ("gough.commands.modes", "run", "every pose that leg readings allow, each proven"),
     "plot": ("gough.commands.plot", "FIGURES", "figures of poses, modes, workspaces and files"),
-    "view": ("gough.view.command", "run", "a machine in the browser, to look at and to drive"),
+    "view": ("gough.commands.view", "run", "a machine in the browser, to look at and to drive"),
     "platforms": (
         "gough.commands.platforms", "run", "the machines that come with gough, as TOML to edit",
     ),
-    "dataset": ("gough.learn.commands", "dataset", "poses and readings to learn from"),
-    "train": ("gough.learn.commands", "train", "a network that guesses poses of your platform"),
-    "evaluate": ("gough.learn.commands", "evaluate", "first guesses side by side"),
-    "paper": ("gough.paper.command", "run", "the DisGNet paper's experiments, run again"),
+    "dataset": ("gough.commands.learn", "dataset", "poses and readings to learn from"),
+    "train": ("gough.commands.learn", "train", "a network that guesses poses of your platform"),
+    "evaluate": ("gough.commands.learn", "evaluate", "first guesses side by side"),
+    "paper": ("gough.commands.paper", "run", "the DisGNet paper's experiments, run again"),
 }  # fmt: skip

@@ -148,7 +148,7 @@ def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
 def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
     import numpy as np
 
-    from gough.modes.result import ModesStatus
+    from gough.status import ModesStatus
 
     real, other, away, meet = modes.paths.reshape(-1, 4)[k]
     mine = modes.row == k

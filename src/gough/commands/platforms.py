@@ -20,7 +20,7 @@ def run(name: Annotated[Positional[str], arg(metavar="[NAME]", help_behavior_hin
         name: a machine of the catalog, or the path of a .toml file to check.
     """
     from gough.platform import Platform
-    from gough.platform_toml import catalog_names, catalog_text
+    from gough.platform_file import catalog_names, catalog_text
 
     if name.endswith(".toml"):
         sys.stdout.write(Platform.load(name).to_toml())

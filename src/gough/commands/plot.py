@@ -295,7 +295,7 @@ def _save(figure: Figure, machine: Platform, out: str | None, name: str) -> int:
 @contextmanager
 def _ticking():
     """What to call after every block: it ends the command if a signal has asked for it."""
-    from gough.commands import stopping
+    from gough.commands import signals as stopping
 
     yield lambda source: stopping.check()
 

@@ -12,10 +12,10 @@ from rich.box import Box
 from rich.console import Console
 from rich.table import Table
 
-from gough.commands import stopping
+from gough.commands import signals as stopping
 
 if TYPE_CHECKING:
-    from gough.files.jobs import Progress as Tick
+    from gough.files.convert import Progress as Tick
     from gough.files.report import Report
     from gough.files.source import Source
     from gough.platform import Platform

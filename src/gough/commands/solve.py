@@ -90,6 +90,6 @@ def run(
 
 def default_seed(machine: Platform) -> str:
     """The network that comes with the package for a machine, or what `solve` takes by itself."""
-    from gough.fk.network import shipped_names
+    from gough.seeds.network import shipped_names
 
     return PREFERRED if PREFERRED in shipped_names(machine) else "auto"

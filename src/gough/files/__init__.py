@@ -8,7 +8,7 @@ A file name ending in .csv or .parquet picks the format; "-" is CSV on standard 
 
 from __future__ import annotations
 
-from gough.files.jobs import inverse_file, solve_file
+from gough.files.convert import inverse_file, solve_file
 from gough.files.report import Report
 from gough.files.source import Reading, open_source
 

@@ -6,18 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.files.report import Outcome
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.status import InverseStatus
 
-PLACED = (
-    Outcome("ok", "The legs have this pose.", True),
-    Outcome("outside_stroke", "A reading is outside the stroke limits: out of reach.", True),
-    Outcome("outside_workspace", "The pose is outside the stated workspace.", True),
-    Outcome("unreachable", "A motor's arm and rod cannot reach the pose.", False),
-    Outcome("invalid_input", "The row is not a pose: correct it.", False),
-)
-OK, OUTSIDE_STROKE, OUTSIDE_WORKSPACE, UNREACHABLE, INVALID = range(5)
+PLACED = tuple(InverseStatus)
+OK, OUTSIDE_STROKE, OUTSIDE_WORKSPACE, UNREACHABLE, INVALID = map(int, InverseStatus)
 
 
 def placed(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.uint8]:

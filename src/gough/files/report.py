@@ -10,23 +10,9 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.pose import Pose
+from gough.status import Outcome
 
 NAMED = 5  # invalid rows that are described one by one
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One of the ends a row can come to.
-
-    Attributes:
-        label: the word in the status column.
-        text: a sentence that a user can act on.
-        usable: whether the row's answer can be used.
-    """
-
-    label: str
-    text: str
-    usable: bool
 
 
 @dataclass

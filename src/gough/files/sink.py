@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 
 from gough.columns import STATUS
 from gough.errors import GoughError
-from gough.files.replace import replacing, why
 from gough.files.source import STANDARD, file_format
+from gough.whole_file import replacing, why
 
 ROW_GROUP = 1 << 18  # rows
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from gough.checks import Array
 from gough.columns import LEGS, leg_columns
-from gough.files.identity import check_same, describe
+from gough.files.metadata import check_same, describe
 from gough.files.sink import open_sink
 from gough.files.source import Reading, open_source
 from gough.platform import Platform

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,16 +10,16 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk import geometry, layout
-from gough.fk.block import UNSETTLED, solve_rows
-from gough.fk.polynomial import Polynomial, constant
-from gough.fk.rescue import rescue_rows
+from gough.kernel import constants as geometry
+from gough.kernel import layout
+from gough.kernel.block import UNSETTLED, solve_rows
+from gough.kernel.rescue import rescue_rows
+from gough.kernel.threads import in_parts
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.seeds.polynomial import Polynomial, constant
 from gough.workspace import Workspace
 
-CHUNK = 16_384  # rows a thread takes at a time
-SERIAL = 4_096  # up to this many rows one thread is faster than several
 SWEEPS = 10  # of a block, before its open rows go to the row solver
 NO_POSES = np.empty((0, 7))
 
@@ -91,7 +88,7 @@ def newton(
             constants, legs, poses, polynomial, settings.tol, sweeps, first, last, out
         )
 
-    return rows, share_out(work, len(legs), settings.workers)
+    return rows, in_parts(work, len(legs), settings.workers)
 
 
 def rescue(
@@ -114,34 +111,7 @@ def rescue(
             settings.max_iterations, settings.singular, out,
         )  # fmt: skip
 
-    share_out(work, len(chosen), settings.workers, chunk=64, serial=64)
-
-
-def share_out(
-    work: Callable[[int, int], int],
-    count: int,
-    workers: int | None,
-    chunk: int = CHUNK,
-    serial: int = SERIAL,
-) -> int:
-    """Sum of work(first, last) over parts of 0..count, on several threads where that pays.
-
-    The compiled code releases the GIL. Threads are the pool's own, not Numba's, whose layers
-    abort or hang when two callers, or a forked child, use them at once.
-    """
-    threads = workers or cores()
-    if threads <= 1 or count <= serial:
-        return work(0, count) if count else 0
-    with ThreadPoolExecutor(threads) as pool:
-        parts = [(i, min(i + chunk, count)) for i in range(0, count, chunk)]
-        return sum(pool.map(lambda part: work(*part), parts))
-
-
-@lru_cache
-def cores() -> int:
-    """How many cores this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
+    in_parts(work, len(chosen), settings.workers, chunk=64, serial=64)
 
 
 def evaluate(platform: Platform, polynomial: Polynomial, legs: Array) -> Pose:

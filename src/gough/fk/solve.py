@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gough.checks import Array
-from gough.fk import bulk, geometry
-from gough.fk.polynomial import Polynomial
-from gough.fk.seeds import PolynomialSeed, PoseSeed, Seed, find_seed
-from gough.fk.status import USABLE, Solution, Status
+from gough.fk import bulk
+from gough.fk.solution import Solution
+from gough.kernel import constants as geometry
+from gough.kernel.threads import in_parts
 from gough.kinematics import pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.seeds.base import PolynomialSeed, PoseSeed, Seed, find_seed
+from gough.seeds.polynomial import Polynomial
+from gough.status import USABLE, Status
 from gough.tables import Origin, Table, as_readings, origin
 
 
@@ -128,7 +131,7 @@ def _finish(
 
 def _certify(platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Settings) -> Array:
     """Radii of uniqueness (N,) [platform unit], 0 where unproven; promotes converged rows."""
-    from gough.fk.certificate import certify
+    from gough.certificate import certify
 
     radius = np.zeros(len(legs))
 
@@ -138,7 +141,7 @@ def _certify(platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Se
         radius[part] = certify(platform, legs[part], pose).radius
         return 0
 
-    bulk.share_out(work, len(legs), settings.workers)
+    in_parts(work, len(legs), settings.workers)
     proven = radius > 0
     rows.status[proven & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
     return radius

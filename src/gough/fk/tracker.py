@@ -3,59 +3,24 @@
 from __future__ import annotations
 
 import reprlib
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gough.errors import GoughError
-from gough.fk import geometry, layout
 from gough.fk.bulk import Settings
 from gough.fk.solve import solve
-from gough.fk.status import Status
-from gough.fk.track_kernel import BAD_READING, CROSSED, FAILED, STATE, cycle
+from gough.kernel import constants as geometry
+from gough.kernel import layout
+from gough.kernel.cycle import BAD_READING, CROSSED, FAILED, STATE, cycle
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
-from gough.pose import Pose
+from gough.pose import Pose, pose_cells
+from gough.status import Event, Status
 from gough.tables import Table, as_readings, is_arrow
+from gough.text import page, pose_heads
 
 PLAIN = (np.ndarray, list, tuple)  # readings without names, told apart quickly
-
-
-class Event(IntEnum):
-    """What a cycle did to the pose; `text` is a sentence that says what to do."""
-
-    FOLLOWED = 0
-    FOUND = 1
-    HELD = 2
-    JUMPED = 3
-    MODE_CHANGED = 4
-
-    @property
-    def text(self) -> str:
-        """A sentence a user can act on."""
-        return _TEXTS[self]
-
-
-_TEXTS = {
-    Event.FOLLOWED: "The pose followed the reading from the last one.",
-    Event.FOUND: (
-        "The pose was found anew, without the last one's help: at the start, or after enough "
-        "readings in a row agreed on a place far from it."
-    ),
-    Event.HELD: (
-        "The reading has no pose, or is no reading, and the last good pose is held: see the "
-        "status for the reason. Tracking goes on with the next good reading."
-    ),
-    Event.JUMPED: (
-        "The reading asks for a pose too far away for one cycle, and the last good pose is held: "
-        "check the sensor, or allow a larger max_shift or max_turn."
-    ),
-    Event.MODE_CHANGED: (
-        "The reading leads across a singularity, so the assembly mode may have changed, and the "
-        "last good pose is held: stop, and check the pose by other means."
-    ),
-}
 
 
 class Tracker:
@@ -158,8 +123,6 @@ class Tracker:
         return f"Tracker({self.platform.name!r}, {told}, {self.pose!r})"
 
     def _repr_html_(self) -> str:
-        from gough.html import page, pose_cells, pose_heads
-
         heads = [*pose_heads((), self.platform.unit), "event", "status"]
         cells = ["", *pose_cells(self.pose), self.event.name.lower(), self.status.label]
         notes = [self.event.text] + [self.status.text] * (self.event != Event.FOLLOWED)

@@ -12,15 +12,15 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk.network import find_network, shipped_names
-from gough.fk.seeds import PolynomialSeed, Seed
 from gough.fk.solve import solve
-from gough.learn.dataset import DatasetSpec, dataset
+from gough.learn.data import DatasetSpec, dataset
 from gough.learn.metrics import THRESHOLDS, Metrics, measure
 from gough.learn.models.polynomial import PolynomialGuess
-from gough.learn.newton import Outcome, outcome, same_pose
+from gough.learn.outcomes import Outcome, outcome, same_pose
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.seeds.base import PolynomialSeed, Seed
+from gough.seeds.network import find_network, shipped_names
 
 HELD_OUT = 20_240_314  # seed of the test poses, which no training uses
 DEGREES = (3, 5, 7)

@@ -20,12 +20,12 @@ import torch
 from torch import Tensor, nn
 
 from gough.errors import GoughError
-from gough.fk.network import FORMAT, seal
 from gough.learn.checkpoint import load_tensors, save_tensors, write_whole
 from gough.learn.config import TrainConfig
 from gough.learn.models import PoseNetwork, Scaling, build
 from gough.learn.models.base import reading_range
 from gough.platform import Platform
+from gough.seeds.network import FORMAT, seal
 
 WEIGHTS, NETWORK = "weights.safetensors", "network.onnx"
 

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from gough.learn.geometry import TorchPlatform
+from gough.learn.kinematics import TorchPlatform
 
 
 def implicit_pose(

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from gough.errors import GoughError
-from gough.learn.geometry import TorchPlatform, euler_to_matrix
+from gough.learn.kinematics import TorchPlatform, euler_to_matrix
 from gough.platform import Platform
 
 TRIES = 64

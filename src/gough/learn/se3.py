@@ -15,7 +15,7 @@ import math
 import torch
 from torch import Tensor
 
-from gough.learn.geometry import quaternion_to_matrix
+from gough.learn.kinematics import quaternion_to_matrix
 
 # Factors of (-q^2)^k in sin q / q, a, b, a' / q, b' / q: for q < 1 ten terms reach rounding.
 _SERIES = [

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import torch
 
-from gough.fk.network import NetworkSeed, shipped_names
 from gough.fk.solve import solve
 from gough.kinematics import leg_lengths
 from gough.learn.loss import default_beta, training_loss
@@ -16,6 +15,7 @@ from gough.learn.models import Scaling, build
 from gough.learn.optim import SOAP
 from gough.learn.sampling import Stream
 from gough.platform import Platform
+from gough.seeds.network import NetworkSeed, shipped_names
 
 EPOCH = 400_000
 

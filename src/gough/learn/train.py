@@ -24,14 +24,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from gough import quaternion
 from gough.errors import GoughError
 from gough.learn.checkpoint import load_state, load_tensors, save_state, write_whole
 from gough.learn.config import TrainConfig
-from gough.learn.dataset import DatasetSpec, dataset
+from gough.learn.data import DatasetSpec, dataset
 from gough.learn.distributed import Team
 from gough.learn.environment import environment
 from gough.learn.export import WEIGHTS, export_run
-from gough.learn.geometry import quaternion_to_matrix
+from gough.learn.kinematics import quaternion_to_matrix
 from gough.learn.logs import Bar, MetricsFile, TensorBoard
 from gough.learn.loss import default_beta, training_loss
 from gough.learn.metrics import THRESHOLDS
@@ -40,7 +41,6 @@ from gough.learn.optim import SOAP
 from gough.learn.sampling import Batch, Stream
 from gough.learn.schedule import Clock, learning_rate
 from gough.platform import Platform
-from gough.pose import wxyz_product
 
 CHECKPOINT, START = "checkpoint.safetensors", "start.safetensors"
 TRAIN, TEST, ORDER = 0, 2, 3  # what a stream's samples are for
@@ -293,7 +293,7 @@ def training_rows(platform: Platform, config: TrainConfig) -> Batch:
     """The first `data.samples` rows of the data set that `gough dataset` writes for this seed."""
     spec = DatasetSpec(config.data.samples or 0, config.run.seed, config.data.same_assembly)
     pose, legs = dataset(platform, spec)
-    turn = wxyz_product(platform.home.inverse().wxyz, pose.wxyz)
+    turn = quaternion.product(platform.home.inverse().wxyz, pose.wxyz)
     shift = pose.position - platform.home.position
     return Batch(torch.tensor(legs), torch.tensor(shift), quaternion_to_matrix(torch.tensor(turn)))
 

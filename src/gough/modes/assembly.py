@@ -8,19 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough.certificate import certify
 from gough.checks import Array
-from gough.fk.bulk import cores
-from gough.fk.certificate import certify
+from gough.kernel.paths import FINITE, LOST
+from gough.kernel.threads import cores
 from gough.kinematics import equivalent_struts
 from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, is_far
 from gough.modes.follow import SHARE, Ends, follow
 from gough.modes.frames import Frames
-from gough.modes.result import AssemblyModes, ModesStatus
+from gough.modes.result import AssemblyModes
 from gough.modes.singular import Problem, classify, curve_of_poses, gather, merge
 from gough.modes.starts import SEED, Start, start_of
 from gough.modes.study import distinct
-from gough.modes.tracker import FINITE, LOST
 from gough.platform import Platform
+from gough.status import ModesStatus
 from gough.tables import Origin, Table, as_readings, origin
 
 CHUNK = 128  # sets of readings per task

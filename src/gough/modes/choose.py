@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough import quaternion
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.kinematics import joint_positions, leg_lengths
 from gough.modes.assembly import assembly_modes
 from gough.modes.result import AssemblyModes
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_to_matrix
+from gough.pose import Pose
 
 BRANCH_SLACK = 1e-6  # [rad] readings of a pose that agree with the given ones
 
@@ -140,7 +141,7 @@ def swing(platform: Platform, pose: Pose) -> Array:
     home = joint_positions(platform, platform.home) - base
     now = joint_positions(platform, pose) - base
     home, now = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (home, now))
-    carried = home @ wxyz_to_matrix(platform.home.wxyz)  # in platform axes
+    carried = home @ quaternion.to_matrix(platform.home.wxyz)  # in platform axes
     seen = now @ pose.rotation
     angles = [_angle(now, home), _angle(seen, carried)]
     return np.maximum(*angles).max(axis=-1)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.jit import jit
-from gough.modes.tracker import FINITE, STUCK
+from gough.kernel.jit import jit
+from gough.kernel.paths import FINITE, STUCK
 
 COMPLEX, REAL, DOUBTFUL = 0, 1, 2  # kinds of ends; DOUBTFUL: close to real, Newton undecided
 NEAR_REAL = 1e-3  # imaginary part over size from which an end is complex beyond doubt

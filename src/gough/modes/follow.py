@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gough.kernel.paths import FINITE, track
 from gough.modes.study import Complex
-from gough.modes.tracker import FINITE, track
 
 SHARE = 0.4  # of the series' radius of convergence per step: fewest passes, see docs/proofs.md
 

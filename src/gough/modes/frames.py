@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gough import quaternion
 from gough.checks import Array
 from gough.modes.study import product
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_to_matrix
+from gough.pose import Pose
 
 # Two rotations in no special position: any others would do.
 _U = np.array([0.52, 0.37, -0.61, 0.47])
@@ -59,14 +60,14 @@ class Frames:
         planes = [_normal(joints) for joints in (base, moving)]
         mirror = None
         if platform.rotary is None and planes[0] is not None and planes[1] is not None:
-            turned = wxyz_to_matrix(_U) @ planes[0], wxyz_to_matrix(_V) @ planes[1]
+            turned = quaternion.to_matrix(_U) @ planes[0], quaternion.to_matrix(_V) @ planes[1]
             mirror = np.append(0.0, turned[0]), np.append(0.0, turned[1])
-        turned_moving = (moving - moving_centre) @ wxyz_to_matrix(_V).T / scale
+        turned_moving = (moving - moving_centre) @ quaternion.to_matrix(_V).T / scale
         return cls(scale, base_centre, moving_centre, platform.pivot_point, turned_moving, mirror)
 
     def base(self, base: Array) -> Array:
         """Normalised base joints (..., 6, 3)."""
-        return (base - self.base_centre) @ wxyz_to_matrix(_U).T / self.scale
+        return (base - self.base_centre) @ quaternion.to_matrix(_U).T / self.scale
 
     def squares(self, lengths: Array) -> Array:
         """Normalised squared lengths (..., 6)."""
@@ -76,8 +77,8 @@ class Frames:
         """The platform's poses of normalised real ones (..., 4), (..., 3)."""
         wxyz = product(product(_U * _CONJUGATE, e), _V)
         wxyz = wxyz / np.linalg.norm(wxyz, axis=-1, keepdims=True)
-        arm = wxyz_to_matrix(wxyz) @ (self.moving_centre - self.pivot)
-        there = self.scale * t @ wxyz_to_matrix(_U) + self.base_centre
+        arm = quaternion.to_matrix(wxyz) @ (self.moving_centre - self.pivot)
+        there = self.scale * t @ quaternion.to_matrix(_U) + self.base_centre
         return Pose(there - arm - self.pivot, np.where(wxyz[..., :1] < 0, -wxyz, wxyz))
 
     def normal(self, pose: Pose) -> tuple[Array, Array]:
@@ -85,7 +86,7 @@ class Frames:
         e = product(product(np.broadcast_to(_U, pose.wxyz.shape), pose.wxyz), _V * _CONJUGATE)
         arm = pose.rotation @ (self.moving_centre - self.pivot)
         there = pose.position + self.pivot + arm - self.base_centre
-        return e, there @ wxyz_to_matrix(_U).T / self.scale
+        return e, there @ quaternion.to_matrix(_U).T / self.scale
 
     def reflect(self, e: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
         """The mirror images of normalised poses of a planar platform."""

@@ -4,74 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gough.certificate import Certificate
 from gough.checks import Array
 from gough.columns import RADIUS, RESIDUAL, STATUS, Angles
-from gough.fk.certificate import Certificate
-from gough.kinematics import (
-    assembly_sign,
-    equivalent_struts,
-    joint_positions,
-    singularity_distance,
-)
+from gough.kinematics import assembly_sign, equivalent_struts, joint_positions, singularity_distance
 from gough.platform import Platform
-from gough.pose import Pose
-from gough.tables import Kind, Origin, Table, make_frame, pose_table
+from gough.pose import Pose, pose_cells, pose_table
+from gough.status import ModesStatus
+from gough.tables import Kind, Origin, Table, make_frame
+from gough.text import length_head, number, page, pose_heads, rows_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-
-class ModesStatus(IntEnum):
-    """What is known about one set of readings; `text` is a sentence that says what to do."""
-
-    COMPLETE = 0
-    SINGULAR = 1
-    SELF_MOTION = 2
-    ALWAYS_SINGULAR = 3
-    INCOMPLETE = 4
-    INVALID_INPUT = 5
-
-    @property
-    def text(self) -> str:
-        """A sentence a user can act on."""
-        return _TEXTS[self]
-
-    @property
-    def label(self) -> str:
-        """The word written to files, such as "complete"."""
-        return self.name.lower()
-
-
-_TEXTS = {
-    ModesStatus.COMPLETE: "Every complex solution was found and told apart: no pose is missing.",
-    ModesStatus.SINGULAR: (
-        "At least one pose is singular: several solutions meet there, so the readings fix it "
-        "poorly, and it cannot be certified; every pose was found."
-    ),
-    ModesStatus.SELF_MOTION: (
-        "The platform can move with these legs locked: the rows of multiplicity 0 are samples "
-        "of that curve of poses."
-    ),
-    ModesStatus.ALWAYS_SINGULAR: (
-        "The legs of this machine are dependent at every pose (it is architecturally singular), "
-        "so readings never fix one: rows are samples of a curve of poses, if any pose has these "
-        "readings at all. Change the joints."
-    ),
-    ModesStatus.INCOMPLETE: (
-        "Some solutions could not be followed to these readings, so a pose may be missing: the "
-        "readings are very close to a singularity."
-    ),
-    ModesStatus.INVALID_INPUT: (
-        "A reading is not a finite number, or a length is not above zero: correct the row."
-    ),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +146,6 @@ class AssemblyModes:
         return f"AssemblyModes({len(self.row)} poses of {len(self.legs)} sets of readings)"
 
     def _repr_html_(self) -> str:
-        from gough.html import length_head, number, page, pose_cells, pose_heads, rows_of
-
         def cells(i: tuple[int, ...]) -> list[str]:
             k = i[0]
             one = self.certificate[k]

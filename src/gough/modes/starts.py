@@ -18,12 +18,12 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from gough.kernel.paths import LOST
 from gough.kinematics import normalised_jacobian
 from gough.modes.follow import Parameters, follow
 from gough.modes.frames import Frames
 from gough.modes.monodromy import APART, CAREFUL, Corner, fill_up, gaussian
 from gough.modes.study import Complex, distances, distinct, inverse
-from gough.modes.tracker import LOST
 from gough.platform import Platform
 from gough.pose import Pose
 

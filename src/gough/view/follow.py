@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gough.checks import Array
-from gough.fk.status import Status
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.status import Status
 
 LONGEST = 0.1  # a step moves the plate by at most so much of the platform's size
 WIDEST = 0.25  # [rad] and turns it by at most so much

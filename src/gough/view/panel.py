@@ -147,7 +147,7 @@ class ModesPanel:
     def show(self, modes: AssemblyModes) -> None:
         """List every mode, as `gough modes` orders and numbers them."""
         from gough.modes.choose import choose_mode
-        from gough.modes.result import ModesStatus
+        from gough.status import ModesStatus
 
         self.clear("")
         choice = choose_mode(modes)

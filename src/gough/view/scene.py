@@ -12,7 +12,8 @@ from gough.checks import Array
 from gough.kinematics import joint_positions
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.view import colors, shapes
+from gough.view import colors
+from gough.view import meshes as shapes
 
 if TYPE_CHECKING:
     import viser

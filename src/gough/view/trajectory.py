@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from gough.checks import Array
 from gough.columns import LEGS, checked, pose_or_leg_columns
 from gough.errors import GoughError, InputError
-from gough.files.identity import check_same
+from gough.files.metadata import check_same
 from gough.files.placing import PLACED, placed
 from gough.files.source import Reading, Source, open_source
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
-from gough.pose import Pose
-from gough.tables import poses_from_columns
+from gough.pose import Pose, poses_from_columns
 from gough.view.follow import has_pose
 from gough.view.model import Answer
 
@@ -179,7 +178,7 @@ def _times(where: str, name: str, number: Array, times: Array) -> Array:
 
 def _from_legs(platform: Platform, legs: Array) -> tuple[Pose, Array, list[Answer]]:
     from gough.fk.solve import solve
-    from gough.fk.status import Status
+    from gough.status import Status
 
     found = solve(platform, legs)
     answers = [

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from gough.checks import Array
-from gough.fk.geometry import SINGULAR
+from gough.kernel.constants import SINGULAR
 from gough.platform import Platform
 from gough.view import colors
 from gough.view.model import Model

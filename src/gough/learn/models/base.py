@@ -10,12 +10,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from gough import quaternion
 from gough.errors import GoughError
 from gough.kinematics import assembly_sign, leg_lengths
-from gough.learn.geometry import euler_to_matrix, quaternion_to_matrix
+from gough.learn.kinematics import euler_to_matrix, quaternion_to_matrix
 from gough.learn.rotation import nearest_rotation
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_product
+from gough.pose import Pose
 
 Rotation = Literal["quaternion", "nine", "euler"]
 OUTPUTS = {"quaternion": 7, "nine": 12, "euler": 6}
@@ -82,7 +83,7 @@ def reading_range(platform: Platform) -> np.ndarray:
     corners = np.array(list(product(*edges)))  # (64, 6)
     turns = Pose.from_euler(np.zeros(3), corners[:, 3:]).wxyz
     home = platform.home
-    poses = Pose(home.position + corners[:, :3], wxyz_product(home.wxyz, turns))
+    poses = Pose(home.position + corners[:, :3], quaternion.product(home.wxyz, turns))
     samples = platform.sample_poses(SCALING_POSES, seed=0)
     legs = np.concatenate([leg_lengths(platform, p) for p in (poses, samples)])
     low, high = np.nanmin(legs, axis=0), np.nanmax(legs, axis=0)

@@ -11,12 +11,13 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from gough import quaternion
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk.network import nearest_rotations
-from gough.learn.dataset import DatasetSpec, dataset
+from gough.learn.data import DatasetSpec, dataset
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_product
+from gough.pose import Pose
+from gough.seeds.network import nearest_rotations
 
 CHUNK = 4096
 SAMPLES_PER_MONOMIAL = 20
@@ -24,7 +25,7 @@ MOST = 8
 
 
 class PolynomialGuess:
-    """A polynomial fitted to one platform's workspace; a `gough.fk.seeds.Seed`.
+    """A polynomial fitted to one platform's workspace; a `gough.seeds.base.Seed`.
 
     Args:
         degree: total degree, 0 to 8; there are comb(6 + degree, 6) monomials.
@@ -59,7 +60,7 @@ class PolynomialGuess:
         raw = np.concatenate(parts) if parts else np.zeros((0, 12))
         turn = Pose.from_rotation(np.zeros(3), nearest_rotations(raw[:, 3:].reshape(-1, 3, 3)))
         home = self._platform.home
-        return Pose(home.position + raw[:, :3], wxyz_product(home.wxyz, turn.wxyz))
+        return Pose(home.position + raw[:, :3], quaternion.product(home.wxyz, turn.wxyz))
 
     def _fit(self, legs: Array, wanted: Array) -> Array:
         """Normal equations, then one step of refinement by the residual."""
@@ -103,6 +104,6 @@ def _steps(degree: int) -> tuple[list[int], list[int]]:
 
 def _targets(platform: Platform, pose: Pose) -> Array:
     """Shift and rotation matrix relative to home, (N, 12)."""
-    turn = wxyz_product(platform.home.inverse().wxyz, pose.wxyz)
+    turn = quaternion.product(platform.home.inverse().wxyz, pose.wxyz)
     relative = Pose(pose.position - platform.home.position, turn)
     return np.concatenate([relative.position, relative.rotation.reshape(-1, 9)], axis=-1)

@@ -1,18 +1,13 @@
-"""What notebooks show in place of a repr: a small table, with units and sentences."""
+"""Text for people: small HTML tables for notebooks, numbers and vectors as words."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-if TYPE_CHECKING:
-    from gough.platform import Platform
-    from gough.pose import Pose
 
 SHOWN = 5  # rows at the start and at the end of a batch
 
@@ -49,30 +44,6 @@ def pose_heads(batch: tuple[int, ...], unit: str) -> list[str]:
 
 
 TURNS = ("rx [deg]", "ry [deg]", "rz [deg]")
-
-
-def pose_cells(pose: Pose) -> list[str]:
-    """Position and Euler angles, R = Rx Ry Rz, in degrees."""
-    return [number(v, ".7g") for v in pose.position] + [
-        number(v, ".4f") for v in np.degrees(pose.euler)
-    ]
-
-
-def platform_notes(platform: Platform) -> list[str]:
-    """Home, pivot and workspace of a platform, a sentence each."""
-    unit = platform.unit or "unit not named"
-    turn = vector(np.degrees(platform.home.euler))
-    notes = [f"home: {vector(platform.home.position)} [{unit}], turned by {turn} [deg]"]
-    if platform.pivot is not None:
-        notes.append(f"pivot: {vector(platform.pivot)} [{unit}]")
-    if platform.workspace is not None:
-        box = platform.workspace
-        sides = [(axis, side, unit) for axis, side in zip("xyz", box.translation, strict=True)]
-        turns = zip(("rx", "ry", "rz"), box.rotation_deg, strict=True)
-        sides += [(axis, side, "deg") for axis, side in turns]
-        told = "; ".join(f"{axis} {vector(side, ' to ')} [{u}]" for axis, side, u in sides)
-        notes.append(f"workspace from home: {told}")
-    return notes
 
 
 def length_head(name: str, unit: str) -> str:

@@ -58,7 +58,7 @@ def dataset(
         rotation: quaternion, or Euler angles with R = Rx Ry Rz [rad].
         processes: that make the rows.
     """
-    from gough.learn.dataset import DatasetSpec, write_dataset
+    from gough.learn.data import DatasetSpec, write_dataset
 
     spec = DatasetSpec(count, seed, same_assembly)
     machine = _platform(platform, workspace)

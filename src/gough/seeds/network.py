@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gough import quaternion
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_product
+from gough.pose import Pose
 
 FORMAT = 1
 NETWORK = "network.onnx"
@@ -31,7 +32,7 @@ _SEAL = len(_HEAD) + 64
 
 
 class NetworkSeed:
-    """A trained network for one platform; a `gough.fk.seeds.Seed`.
+    """A trained network for one platform; a `gough.seeds.base.Seed`.
 
     Attributes:
         name: what the network is called in messages.
@@ -111,7 +112,7 @@ class NetworkSeed:
         else:
             matrices = nearest_rotations(rest.reshape(*rest.shape[:-1], 3, 3))
             turn = Pose.from_rotation(shift, matrices).wxyz
-        return Pose(home.position + shift, wxyz_product(home.wxyz, turn))
+        return Pose(home.position + shift, quaternion.product(home.wxyz, turn))
 
 
 def nearest_rotations(matrices: Array) -> Array:

@@ -13,12 +13,14 @@ from math import comb
 
 import numpy as np
 
+from gough import quaternion
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk import geometry, layout
+from gough.kernel import constants as geometry
+from gough.kernel import layout
 from gough.kinematics import assembly_sign, leg_lengths
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_product
+from gough.pose import Pose
 
 SAMPLES_PER_MONOMIAL = 100
 MINIMUM_SAMPLES = 20_000
@@ -147,5 +149,5 @@ def _outputs(platform: Platform, pose: Pose) -> Array:
     """Internal position and Gibbs vector of the turn from home, (N, 6)."""
     internal = geometry.to_internal(geometry.constants(platform), pose)
     back = platform.home.inverse().wxyz
-    turn = wxyz_product(pose.wxyz, np.broadcast_to(back, pose.wxyz.shape))
+    turn = quaternion.product(pose.wxyz, np.broadcast_to(back, pose.wxyz.shape))
     return np.concatenate([internal[:, :3], turn[:, 1:] / turn[:, :1]], axis=-1)

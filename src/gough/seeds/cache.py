@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gough.fk.polynomial import Polynomial, monomials
 from gough.platform import Platform
+from gough.seeds.polynomial import Polynomial, monomials
 
 VERSION = 1  # of the fit: raise it when polynomials fitted before are no longer right
 

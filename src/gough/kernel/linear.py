@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.jit import jit
+from gough.kernel.jit import jit
 
 
 @jit()

@@ -19,12 +19,13 @@ from typing import Literal
 
 import numpy as np
 
+from gough import quaternion
 from gough.checks import Array
 from gough.errors import GoughError, InputError
 from gough.kinematics import assembly_sign, leg_lengths
 from gough.learn.graph import NODES, HexapodGraph, edge_lengths
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_product
+from gough.pose import Pose
 
 CHUNK = 10_000
 TRIES = 64
@@ -171,7 +172,7 @@ def _write(platform, temporary, suffix, spec, layout, rotation, processes) -> No
 def _columns(platform: Platform, pose: Pose, legs: Array, layout: str, rotation: str) -> Array:
     """All numbers of a chunk, (rows, columns)."""
     if layout == "paper":
-        turn = wxyz_product(platform.home.inverse().wxyz, pose.wxyz)
+        turn = quaternion.product(platform.home.inverse().wxyz, pose.wxyz)
         pose = Pose(pose.position - platform.home.position, turn)
     parts = [pose.position, pose.wxyz if rotation == "quaternion" else pose.euler, legs]
     if layout == "paper":
@@ -185,5 +186,5 @@ def _draw(platform: Platform, rows: int, rng: np.random.Generator) -> tuple[Pose
     shift = rng.uniform(*box.translation.T, size=(rows, 3))
     angles = np.radians(rng.uniform(*box.rotation_deg.T, size=(rows, 3)))
     turn = Pose.from_euler(np.zeros(3), angles).wxyz
-    pose = Pose(platform.home.position + shift, wxyz_product(platform.home.wxyz, turn))
+    pose = Pose(platform.home.position + shift, quaternion.product(platform.home.wxyz, turn))
     return pose, leg_lengths(platform, pose)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.equations import get_quaternion, inline, put_quaternion, rotation, turned
-from gough.fk.layout import (
+from gough.kernel.equations import get_quaternion, inline, put_quaternion, rotation, turned
+from gough.kernel.layout import (
     ARM_X,
     ARM_Y,
     BASE,

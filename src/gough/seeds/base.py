@@ -10,9 +10,9 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk import cache, polynomial
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.seeds import cache, polynomial
 
 DEGREE = 3  # fast to evaluate, and the first degree that seldom leads to another mode
 
@@ -124,7 +124,7 @@ def _named(platform: Platform, name: str) -> Seed:
 
 def _network(platform: Platform, name: str) -> Seed:
     """A trained network, by path or by the name of one that comes with the package."""
-    from gough.fk.network import find_network, shipped_names
+    from gough.seeds.network import find_network, shipped_names
 
     ours = shipped_names(platform)
     if name in ours:
@@ -145,6 +145,6 @@ def _polynomial(platform: Platform, degree: int) -> Seed:
 
 @lru_cache(maxsize=8)
 def _shipped(platform: Platform, name: str) -> Seed:
-    from gough.fk.network import NetworkSeed
+    from gough.seeds.network import NetworkSeed
 
     return NetworkSeed.shipped(platform, name)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.equations import inline, put_quaternion
-from gough.fk.layout import WIDTH
+from gough.kernel.equations import inline, put_quaternion
+from gough.kernel.layout import WIDTH
 
 CLAMP = 1.25  # readings further out than this share of the fitted range are drawn in to it
 SPAN = np.uint64(WIDTH)

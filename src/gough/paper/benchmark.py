@@ -21,7 +21,7 @@ from gough.checks import Array
 from gough.errors import GoughError
 from gough.learn.evaluate import held_out
 from gough.learn.metrics import Metrics, measure
-from gough.learn.newton import Outcome, outcome
+from gough.learn.outcomes import Outcome, outcome
 from gough.paper.layout import number, percent
 from gough.paper.plan import machine_of
 from gough.platform import Platform

@@ -1,89 +1,24 @@
-"""What is known about each solved row."""
+"""The result of forward kinematics: poses, the status of each, and both as named columns."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.columns import Angles
-from gough.pose import Pose
+from gough.columns import Angles, pose_names, solution_names
+from gough.pose import Pose, pose_cells, pose_values
+from gough.status import USABLE, Status
 from gough.tables import Kind, Origin, Table, make_frame
+from gough.text import length_head, number, page, pose_heads, rows_of
 
+if TYPE_CHECKING:
+    import pyarrow as pa
 
-class Status(IntEnum):
-    """The outcome of one row; `text` is a sentence that says what to do."""
-
-    CONVERGED = 0
-    OUTSIDE_STROKE = 1
-    NEAR_SINGULARITY = 2
-    OUTSIDE_WORKSPACE = 3
-    UNREACHABLE = 4
-    NOT_CONVERGED = 5
-    INVALID_INPUT = 6
-    CERTIFIED = 7
-    AMBIGUOUS = 8
-
-    @property
-    def text(self) -> str:
-        """A sentence a user can act on."""
-        return _TEXTS[self]
-
-    @property
-    def label(self) -> str:
-        """The word written to files, such as "outside_stroke"."""
-        return self.name.lower()
-
-    @property
-    def usable(self) -> bool:
-        """The pose has these legs and is, as far as is known, the machine's own."""
-        return self in USABLE
-
-
-USABLE = (
-    Status.CONVERGED, Status.OUTSIDE_STROKE, Status.NEAR_SINGULARITY, Status.CERTIFIED,
-)  # fmt: skip
-
-_TEXTS = {
-    Status.CONVERGED: "The pose has these leg readings to within the tolerance.",
-    Status.OUTSIDE_STROKE: (
-        "The pose has these leg readings, but a reading is outside the stroke limits: check the "
-        "sensor's zero, the unit, or the limits in the platform file."
-    ),
-    Status.NEAR_SINGULARITY: (
-        "The pose has these leg readings, but is close to a singularity, where small reading "
-        "errors become large pose errors: treat its last digits with care, or move away."
-    ),
-    Status.OUTSIDE_WORKSPACE: (
-        "A pose has these leg readings, but it is outside the stated workspace or beyond a "
-        "singularity, so it is probably another assembly mode: pass a seed near the true pose, "
-        "or widen the workspace."
-    ),
-    Status.UNREACHABLE: (
-        "No pose was found that has these leg readings; the residual says by how much the "
-        "nearest misses: check the readings' unit, order and zero, and the platform's joints."
-    ),
-    Status.NOT_CONVERGED: (
-        "The iteration limit was reached before the tolerance: allow more iterations, pass a "
-        "seed closer to the pose, or ask for a wider tolerance."
-    ),
-    Status.INVALID_INPUT: (
-        "A reading is not a finite number, or a length is not above zero: correct the row."
-    ),
-    Status.CERTIFIED: (
-        "Proven: exactly one pose with these leg readings lies within the stated radius of this "
-        "one."
-    ),
-    Status.AMBIGUOUS: (
-        "Another pose has these leg readings too, inside the workspace and the stroke and on "
-        "home's side of the singularities: readings alone cannot tell which is the machine's; use "
-        "a seed near the true pose, or another sensor (see gough.choose_mode)."
-    ),
-}
+LABELS = tuple(status.label for status in Status)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +83,6 @@ class Solution:
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
         """
-        from gough.fk.frame import solution_columns
-
         return make_frame(solution_columns(self, angles), kind, self.origin)
 
     def __repr__(self) -> str:
@@ -162,8 +95,6 @@ class Solution:
         return f"Solution(batch {self.pose.batch}; {found})"
 
     def _repr_html_(self) -> str:
-        from gough.html import length_head, number, page, pose_cells, pose_heads, rows_of
-
         def cells(i: tuple[int, ...]) -> list[str]:
             at = self[i] if i else self
             radius = [] if at.radius is None else [number(at.radius, ".3g")]
@@ -180,3 +111,27 @@ class Solution:
             notes.append(f"{times:,} {status.label}{where}: {status.text}")
         rows = rows_of(self.pose.batch, cells)
         return page(f"Solution of {np.size(self.status):,}", heads, rows, notes)
+
+
+def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.Array]:
+    """The columns of `solution_names`, each with a value for every row, batch axes flattened.
+
+    Args:
+        angles: Euler angles in these units in place of the quaternion.
+
+    Raises:
+        GoughError: angles of another name.
+    """
+    from gough.arrow import label_column, number_column
+
+    with_covariance, with_radius = solution.covariance is not None, solution.radius is not None
+    numbers = list(pose_values(solution.pose, angles).T)
+    numbers += [np.ravel(solution.residual), np.ravel(solution.iterations)]
+    if solution.covariance is not None:
+        variances = np.diagonal(solution.covariance, axis1=-2, axis2=-1)
+        numbers += list(np.sqrt(variances).reshape(-1, 6).T)
+    if solution.radius is not None:
+        numbers.append(np.ravel(solution.radius))
+    columns = [number_column(values) for values in numbers]
+    columns.insert(len(pose_names(angles)), label_column(np.ravel(solution.status), LABELS))
+    return dict(zip(solution_names(angles, with_covariance, with_radius), columns, strict=True))

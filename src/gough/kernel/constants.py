@@ -6,11 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from gough import quaternion
 from gough.checks import Array
-from gough.fk import layout
+from gough.kernel import layout
 from gough.kinematics import equivalent_struts, joint_positions, joint_radius, normalised_jacobian
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_to_matrix
+from gough.pose import Pose
 
 SINGULAR = 1e-3  # distance to singularity below which a pose is called close to one
 SLACK = 1e-9  # of the platform's size, and [rad]: keeps poses on the box's faces inside
@@ -111,6 +112,6 @@ def solving_order(platform: Platform) -> np.ndarray:
 
 def to_internal(c: Array, pose: Pose) -> Array:
     """Poses (...) as internal position and quaternion (..., 7), given the constants."""
-    lever = wxyz_to_matrix(pose.wxyz) @ c[layout.PIVOT : layout.PIVOT + 3]
+    lever = quaternion.to_matrix(pose.wxyz) @ c[layout.PIVOT : layout.PIVOT + 3]
     position = (pose.position - c[layout.ORIGIN : layout.ORIGIN + 3]) / c[layout.SIZE] - lever
     return np.concatenate([position, pose.wxyz], axis=-1)

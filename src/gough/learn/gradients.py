@@ -9,13 +9,13 @@ from torch import Tensor
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk.seeds import Seed, find_seed
+from gough.fk.solution import Solution
 from gough.fk.solve import solve as fast_solve
-from gough.fk.status import Solution
-from gough.learn.geometry import TorchPlatform
 from gough.learn.implicit import implicit_pose
+from gough.learn.kinematics import TorchPlatform
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.seeds.base import Seed, find_seed
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.jit import jit
-from gough.fk.lanes import LANES, SLOT
-from gough.modes.series import (
+from gough.kernel.jit import jit
+from gough.kernel.lanes import LANES, SLOT
+from gough.kernel.series import (
     BASE,
     BASE_RATE,
     L2,

@@ -19,8 +19,8 @@ All functions work on a flat float64 array `z` of slots (see lanes.py).
 
 from __future__ import annotations
 
-from gough.fk.jit import jit
-from gough.fk.lanes import SLOT, get, ones, put, reciprocal, zero
+from gough.kernel.jit import jit
+from gough.kernel.lanes import SLOT, get, ones, put, reciprocal, zero
 
 ORDER = 6  # of the Taylor series
 

@@ -61,7 +61,7 @@ def run(
 
     machine = Platform.load(platform)
     if html is not None:
-        from gough.files.replace import check_target
+        from gough.whole_file import check_target
 
         check_target(html)
     rows_of_file = None
@@ -78,9 +78,9 @@ def run(
 
 
 def _write(path: str, platform: Platform, trajectory: Trajectory | None) -> int:
-    from gough.files.replace import replacing
     from gough.view.export import page
     from gough.view.model import Model
+    from gough.whole_file import replacing
 
     text = page(Model(platform), trajectory)
     with replacing(path) as file:

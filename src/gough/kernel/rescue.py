@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.descent import SOLVED, STATIONARY, UNFINISHED, descend
-from gough.fk.equations import assess
-from gough.fk.jit import jit
-from gough.fk.layout import (
+from gough.kernel.descent import SOLVED, STATIONARY, UNFINISHED, descend
+from gough.kernel.equations import assess
+from gough.kernel.jit import jit
+from gough.kernel.layout import (
     BASE,
     COMPONENTS,
     DETERMINANT,
@@ -19,9 +19,9 @@ from gough.fk.layout import (
     RESIDUAL,
     SIZE,
 )
-from gough.fk.linear import pivoted_solve, smallest_singular_value
-from gough.fk.readings import give_pose, in_stroke, place, put_pose, take_reading
-from gough.fk.status import Status
+from gough.kernel.linear import pivoted_solve, smallest_singular_value
+from gough.kernel.pose_io import give_pose, in_stroke, place, put_pose, take_reading
+from gough.status import Status
 
 CONVERGED, OUTSIDE_STROKE = int(Status.CONVERGED), int(Status.OUTSIDE_STROKE)
 NEAR_SINGULARITY, OUTSIDE_WORKSPACE = int(Status.NEAR_SINGULARITY), int(Status.OUTSIDE_WORKSPACE)

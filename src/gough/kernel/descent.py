@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.equations import get_quaternion, move, rotation, strut
-from gough.fk.jit import jit
-from gough.fk.layout import LENGTH, QUATERNION, RADIUS
-from gough.fk.linear import pivoted_solve, shifted_solve
+from gough.kernel.equations import get_quaternion, move, rotation, strut
+from gough.kernel.jit import jit
+from gough.kernel.layout import LENGTH, QUATERNION, RADIUS
+from gough.kernel.linear import pivoted_solve, shifted_solve
 
 SOLVED = 0  # a pose with these lengths
 STATIONARY = 1  # misses them, and no small motion comes closer

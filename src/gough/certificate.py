@@ -30,12 +30,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough import quaternion
 from gough.checks import Array
-from gough.fk.jit import jit
-from gough.fk.lanes import LANES, get_real, larger, magnitude, put_real, root
+from gough.kernel.jit import jit
+from gough.kernel.lanes import LANES, get_real, larger, magnitude, put_real, root
 from gough.kinematics import equivalent_struts
 from gough.platform import Platform
-from gough.pose import Pose, wxyz_to_matrix
+from gough.pose import Pose
 from gough.tables import Table
 
 UNIT = 2.0**-53
@@ -86,7 +87,7 @@ class Certificate:
         return f"Certificate({np.sum(self.certified)} of {np.size(self.certified)} certified{told})"
 
     def _repr_html_(self) -> str:
-        from gough.html import length_head, number, page, rows_of
+        from gough.text import length_head, number, page, rows_of
 
         def cells(i: tuple[int, ...]) -> list[str]:
             at = self[i]
@@ -161,7 +162,7 @@ def _bulk_with(
     centre = moving.mean(axis=0)
     arms = moving - centre
     size = float(np.sqrt(np.mean(np.sum(arms**2, axis=1))))
-    matrix = wxyz_to_matrix(turn)
+    matrix = quaternion.to_matrix(turn)
     _bulk(
         np.ascontiguousarray(base @ matrix.T), arms, centre, size, np.ascontiguousarray(lengths),
         np.ascontiguousarray(position), np.ascontiguousarray(wxyz), turn, matrix, radius, error,

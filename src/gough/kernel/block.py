@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.equations import SMALL, assess, inline, newton_step
-from gough.fk.jit import jit
-from gough.fk.layout import (
+from gough.kernel.equations import SMALL, assess, inline, newton_step
+from gough.kernel.jit import jit
+from gough.kernel.layout import (
     COMPONENTS,
     COUNT,
     INSIDE,
@@ -28,9 +28,9 @@ from gough.fk.layout import (
     STEP,
     WIDTH,
 )
-from gough.fk.polynomial_kernel import guess_block
-from gough.fk.readings import give_pose, in_stroke, place, put_pose, take_reading
-from gough.fk.status import Status
+from gough.kernel.polynomial import guess_block
+from gough.kernel.pose_io import give_pose, in_stroke, place, put_pose, take_reading
+from gough.status import Status
 
 # A row's verdict is its status, or what it still needs.
 DONE = int(Status.CONVERGED)

@@ -25,8 +25,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.jit import jit
-from gough.fk.layout import (
+from gough.kernel.jit import jit
+from gough.kernel.layout import (
     BASE,
     CENTRE,
     COUNT,

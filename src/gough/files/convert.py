@@ -24,20 +24,20 @@ from gough.columns import (
 )
 from gough.errors import GoughError
 from gough.files.block import Block
-from gough.files.identity import check_same, describe
+from gough.files.metadata import check_same, describe
 from gough.files.placing import INVALID, PLACED, placed
-from gough.files.report import NAMED, Outcome, Report
+from gough.files.report import NAMED, Report
 from gough.files.sink import Sink, open_sink
 from gough.files.source import STANDARD, Reading, Source, file_format, open_source
-from gough.fk.frame import solution_columns
-from gough.fk.status import Status
+from gough.fk.solution import solution_columns
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
-from gough.tables import poses_from_columns
+from gough.pose import poses_from_columns
+from gough.status import Outcome, Status
 
 Progress = Callable[[Source, Report], None]
 
-SOLVED = tuple(Outcome(s.label, s.text, s.usable) for s in Status)
+SOLVED = tuple(Status)
 
 
 def solve_file(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.fk.block import MAYBE_OTHER_MODE, MAYBE_SINGULAR, UNSETTLED, verdict
-from gough.fk.descent import strut_errors
-from gough.fk.equations import SMALL, assess, newton_step
-from gough.fk.jit import jit
-from gough.fk.layout import DETERMINANT, OPEN, QUATERNION, STEP
-from gough.fk.linear import smallest_singular_value
-from gough.fk.readings import give_pose, in_stroke, place, put_pose, take_reading
-from gough.fk.status import Status
+from gough.kernel.block import MAYBE_OTHER_MODE, MAYBE_SINGULAR, UNSETTLED, verdict
+from gough.kernel.descent import strut_errors
+from gough.kernel.equations import SMALL, assess, newton_step
+from gough.kernel.jit import jit
+from gough.kernel.layout import DETERMINANT, OPEN, QUATERNION, STEP
+from gough.kernel.linear import smallest_singular_value
+from gough.kernel.pose_io import give_pose, in_stroke, place, put_pose, take_reading
+from gough.status import Status
 
 # What a cycle may say besides a status: the pose is as it was before.
 FAILED = OPEN

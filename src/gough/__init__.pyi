@@ -1,0 +1,34 @@
+# The public names, once: type checkers read this file, and so does `__init__.py` when it runs.
+
+from .certificate import Certificate as Certificate
+from .certificate import certify as certify
+from .errors import GoughError as GoughError
+from .errors import InputError as InputError
+from .errors import PlatformError as PlatformError
+from .fk.solution import Solution as Solution
+from .fk.solve import solve as solve
+from .fk.tracker import Tracker as Tracker
+from .kinematics import assembly_sign as assembly_sign
+from .kinematics import jacobian as jacobian
+from .kinematics import joint_positions as joint_positions
+from .kinematics import leg_lengths as leg_lengths
+from .kinematics import pose_covariance as pose_covariance
+from .kinematics import singularity_distance as singularity_distance
+from .modes.assembly import assembly_modes as assembly_modes
+from .modes.choose import Choice as Choice
+from .modes.choose import choose_mode as choose_mode
+from .modes.result import AssemblyModes as AssemblyModes
+from .platform import Platform as Platform
+from .pose import Pose as Pose
+from .rotary import RotaryArms as RotaryArms
+from .seeds.base import PolynomialSeed as PolynomialSeed
+from .seeds.base import PoseSeed as PoseSeed
+from .seeds.base import Seed as Seed
+from .seeds.network import NetworkSeed as NetworkSeed
+from .status import Event as Event
+from .status import ModesStatus as ModesStatus
+from .status import Status as Status
+from .workspace import Workspace as Workspace
+
+__all__: list[str]
+__version__: str

@@ -1,0 +1,38 @@
+"""Work on many rows, divided among threads that run compiled code."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
+CHUNK = 16_384  # rows a thread takes at a time
+SERIAL = 4_096  # up to this many rows one thread is faster than several
+
+
+def in_parts(
+    work: Callable[[int, int], int],
+    count: int,
+    workers: int | None,
+    chunk: int = CHUNK,
+    serial: int = SERIAL,
+) -> int:
+    """Sum of work(first, last) over parts of 0..count, on several threads where that pays.
+
+    The compiled code releases the GIL. Threads are the pool's own, not Numba's, whose layers
+    abort or hang when two callers, or a forked child, use them at once.
+    """
+    threads = workers or cores()
+    if threads <= 1 or count <= serial:
+        return work(0, count) if count else 0
+    with ThreadPoolExecutor(threads) as pool:
+        parts = [(i, min(i + chunk, count)) for i in range(0, count, chunk)]
+        return sum(pool.map(lambda part: work(*part), parts))
+
+
+@lru_cache
+def cores() -> int:
+    """How many cores this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
