@@ -106,14 +106,14 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full_disk)
-    with pytest.raises(PlatformError, match=r"machine\.toml: cannot be written: No space left"):
+    with pytest.raises(PlatformError, match=r"machine\.toml: cannot be written: the disk is full"):
         REFERENCE.save(target)
     assert target.read_text() == "old"
     assert os.listdir(tmp_path) == ["machine.toml"]
 
 
 def test_saving_into_a_missing_folder_says_so(tmp_path: Path) -> None:
-    with pytest.raises(PlatformError, match=r"x\.toml: cannot be written: No such file"):
+    with pytest.raises(PlatformError, match=r"x\.toml: cannot be written: there is no folder"):
         REFERENCE.save(tmp_path / "nowhere" / "x.toml")
 
 

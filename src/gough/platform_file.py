@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -16,6 +14,7 @@ from gough.errors import GoughError, PlatformError, suggestion
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
+from gough.whole_file import write_whole
 from gough.workspace import Workspace
 
 REQUIRED = ("base", "moving", "home")
@@ -93,19 +92,10 @@ def to_toml(platform: Platform) -> str:
 
 def save(platform: Platform, path: str | Path) -> None:
     """See `Platform.save`."""
-    target = Path(path)
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(to_toml(platform))
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, target)
-        except BaseException:
-            os.unlink(temporary)
-            raise
-    except OSError as error:
-        raise PlatformError(f"{path}: cannot be written: {error.strerror}") from None
+        write_whole(path, to_toml(platform).encode())
+    except GoughError as error:
+        raise PlatformError(str(error)) from None
 
 
 def _from_dict(facts: dict) -> Platform:

@@ -1,4 +1,4 @@
-"""A file that appears whole under its name, or not at all."""
+"""Write a file that appears whole under its name, or not at all."""
 
 from __future__ import annotations
 
@@ -21,26 +21,45 @@ except ModuleNotFoundError:  # not a Unix
 BUFFER = 1 << 20  # bytes
 
 
-@contextmanager
-def replacing(path: str | Path) -> Iterator[BinaryIO]:
-    """A binary file to write; on leaving without an error it takes the place of `path`.
-
-    It is written as PATH.PID.partial in the same folder, brought to the disk, given the old
-    file's permissions (or the usual ones) and renamed. After any error or interruption it is
-    removed, and what was at `path` is untouched. Only a process that is killed outright leaves
-    the .partial file behind; the next one to write `path` removes it.
+def write_whole(path: str | Path, content: bytes) -> None:
+    """Write `content` as the file `path`; see `replacing`.
 
     Raises:
         GoughError: the folder or the disk does not allow it.
     """
-    target = Path(os.path.realpath(path))  # a link stays a link to the new file
+    with replacing(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a binary file that replaces `path` when the block ends without an error.
+
+    It is written as PATH.PID.partial in the same folder, flushed to the disk, given the old
+    file's permissions (or the usual ones) and renamed. After any error or interruption it is
+    removed, and the file at `path` is unchanged. Only a process that is killed outright leaves
+    the .partial file behind; the next one to write `path` removes it. A symbolic link stays: its
+    target is replaced. A pipe or a device, which cannot be replaced, is written directly.
+
+    Raises:
+        GoughError: the folder or the disk does not allow it.
+
+    Example:
+        >>> with replacing("poses.csv") as file:
+        ...     file.write(b"x,y,z")
+    """
     check_target(path)
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        with _written_directly(path) as file:
+            yield file
+        return
     temporary = target.with_name(f"{target.name}.{os.getpid()}.partial")
     file = None
     try:
         _remove_left_behind(target)
         file = _open_new(temporary)
-        _hold(file.fileno())
+        _lock(file.fileno())
         yield file
         file.flush()
         os.fsync(file.fileno())
@@ -56,32 +75,44 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         with suppress(OSError):  # also where a signal came between making and naming the file
             os.unlink(temporary)
         if isinstance(error, OSError):
-            raise GoughError(f"{path}: {why(error)}; nothing was changed there") from None
+            raise GoughError(f"{path}: {explain(error)}; nothing was changed there") from None
         raise
 
 
 def check_target(path: str | Path) -> None:
-    """That a file can be put at `path`, without touching it.
+    """Raise if no file can be written at `path`; nothing is touched.
 
     Raises:
-        GoughError: no such folder, or `path` is a folder or a device.
+        GoughError: there is no such folder, or `path` is a folder.
     """
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise GoughError(f"{path}: is a folder; name a file in it")
-    if target.exists() and not target.is_file():
-        raise GoughError(f"{path}: is a device or a pipe, not a file; use -o - and redirect it")
     if not target.parent.is_dir():
-        raise GoughError(f"{path}: there is no folder {target.parent}; make it first")
+        raise GoughError(
+            f"{path}: cannot be written: there is no folder {target.parent}; make it first"
+        )
 
 
-def why(error: OSError) -> str:
-    """What an error of the operating system means, and what to do."""
+def explain(error: OSError) -> str:
+    """Return what an error of the operating system means for a file to write, and the cure."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return "cannot be written: the disk is full; free some space or write elsewhere"
     if error.errno == errno.EFBIG:
         return "cannot be written: larger than files may be here (ulimit -f); write elsewhere"
     return f"cannot be written: {error.strerror or error}"
+
+
+@contextmanager
+def _written_directly(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a pipe or a device."""
+    try:
+        with open(path, "wb", buffering=BUFFER) as file:
+            yield file
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise GoughError(f"{path}: {explain(error)}") from None
 
 
 def _open_new(path: Path) -> BinaryIO:
@@ -96,22 +127,22 @@ def _open_new(path: Path) -> BinaryIO:
 
 
 def _remove_left_behind(target: Path) -> None:
-    """Delete what killed processes left of earlier attempts at the same file.
+    """Delete the .partial files of `target` that killed processes left.
 
-    Only where both are certain: no process here has the number in the name, and nobody holds
-    the file, be it from another machine or container.
+    A file is deleted only where no process here has the number in its name, and nobody, not even
+    on another machine or in another container, has it locked.
     """
     name = re.compile(re.escape(target.name) + r"\.([1-9][0-9]{0,9})\.partial")
     with os.scandir(target.parent) as entries:
         left = [(entry.path, found) for entry in entries if (found := name.fullmatch(entry.name))]
     for path, found in left:
         with suppress(OSError):  # not ours to open or delete, or gone already
-            if not _is_running(int(found[1])) and _is_free(path):
+            if not _is_running(int(found[1])) and _is_unlocked(path):
                 os.unlink(path)
 
 
 def _is_running(process: int) -> bool:
-    """Whether a process of this number may be running here."""
+    """Return whether a process of this number may be running here."""
     if fcntl is None:  # os.kill would end it on Windows
         return True
     try:
@@ -123,15 +154,15 @@ def _is_running(process: int) -> bool:
     return True
 
 
-def _hold(handle: int) -> None:
-    """Lock a file until it is closed, where the file system can do that."""
+def _lock(handle: int) -> None:
+    """Lock a file until it is closed, where the file system has locks."""
     if fcntl is not None:
         with suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def _is_free(path: str) -> bool:
-    """Whether nobody holds a plain file; not on file systems that cannot tell."""
+def _is_unlocked(path: str) -> bool:
+    """Return whether a plain file is free to be locked; False where there are no locks."""
     if fcntl is None or not stat.S_ISREG(os.lstat(path).st_mode):
         return False
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
@@ -145,7 +176,7 @@ def _is_free(path: str) -> bool:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring the renaming itself to the disk, where the system can do that."""
+    """Flush the renaming itself to the disk, where the system can do that."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

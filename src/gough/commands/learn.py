@@ -159,7 +159,9 @@ def evaluate(
     rows = loop.evaluate(machine, chosen, poses=poses, same_assembly=same_assembly)
     Console(width=max(Console().width, 200)).print(loop.table(machine, rows))
     if json is not None:
-        json.write_text(loop.to_json(rows))
+        from gough.whole_file import write_whole
+
+        write_whole(json, loop.to_json(rows).encode())
     return 0
 
 

@@ -80,11 +80,9 @@ def run(
 def _write(path: str, platform: Platform, trajectory: Trajectory | None) -> int:
     from gough.view.export import page
     from gough.view.model import Model
-    from gough.whole_file import replacing
+    from gough.whole_file import write_whole
 
-    text = page(Model(platform), trajectory)
-    with replacing(path) as file:
-        file.write(text.encode())
+    write_whole(path, page(Model(platform), trajectory).encode())
     print(f"{path}: {Path(path).stat().st_size / 1e6:.1f} MB; opens in any browser, offline")
     return 1 if trajectory is not None and trajectory.failures else 0
 

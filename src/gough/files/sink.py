@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from gough.columns import STATUS
 from gough.errors import GoughError
 from gough.files.source import STANDARD, file_format
-from gough.whole_file import replacing, why
+from gough.whole_file import explain, replacing
 
 ROW_GROUP = 1 << 18  # rows
 
@@ -164,4 +164,4 @@ def _standard_output() -> Iterator[BinaryIO]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise GoughError(f"standard output: {why(error)}") from None
+        raise GoughError(f"standard output: {explain(error)}") from None

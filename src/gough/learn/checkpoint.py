@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from pathlib import Path
 
 import torch
@@ -14,19 +12,7 @@ from torch import Tensor, nn
 from torch.optim import Optimizer
 
 from gough.errors import GoughError
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file beside its target, then rename it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+from gough.whole_file import write_whole
 
 
 def save_tensors(path: Path, tensors: dict[str, Tensor], facts: dict) -> None:

@@ -7,7 +7,6 @@ seed gives the same rows whatever number of processes makes them.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from gough.kinematics import assembly_sign, leg_lengths
 from gough.learn.graph import NODES, HexapodGraph, edge_lengths
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.whole_file import replacing
 
 CHUNK = 10_000
 TRIES = 64
@@ -130,20 +130,12 @@ def write_dataset(
         raise InputError(f"{path}: expected a name that ends in .parquet or .csv")
     if spec.count < 1:
         raise InputError(f"count: expected 1 or more, got {spec.count}")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        _write(platform, temporary, path.suffix, spec, layout, rotation, processes)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as file:
+        _write(platform, file, path.suffix, spec, layout, rotation, processes)
     return path
 
 
-def _write(platform, temporary, suffix, spec, layout, rotation, processes) -> None:
+def _write(platform, file, suffix, spec, layout, rotation, processes) -> None:
     import pyarrow as pa
     from pyarrow import csv, parquet
 
@@ -156,10 +148,10 @@ def _write(platform, temporary, suffix, spec, layout, rotation, processes) -> No
         metadata={f"gough.{key}": str(value) for key, value in facts.items()},
     )
     if suffix == ".csv":
-        writer = csv.CSVWriter(temporary, schema)
+        writer = csv.CSVWriter(file, schema)
     else:
         writer = parquet.ParquetWriter(
-            temporary, schema, compression="zstd", use_dictionary=False,
+            file, schema, compression="zstd", use_dictionary=False,
             use_byte_stream_split=True,
         )  # fmt: skip
     with writer:

@@ -20,12 +20,13 @@ import torch
 from torch import Tensor, nn
 
 from gough.errors import GoughError
-from gough.learn.checkpoint import load_tensors, save_tensors, write_whole
+from gough.learn.checkpoint import load_tensors, save_tensors
 from gough.learn.config import TrainConfig
 from gough.learn.models import PoseNetwork, Scaling, build
 from gough.learn.models.base import reading_range
 from gough.platform import Platform
 from gough.seeds.network import FORMAT, seal
+from gough.whole_file import write_whole
 
 WEIGHTS, NETWORK = "weights.safetensors", "network.onnx"
 

@@ -26,7 +26,7 @@ from torch import Tensor
 
 from gough import quaternion
 from gough.errors import GoughError
-from gough.learn.checkpoint import load_state, load_tensors, save_state, write_whole
+from gough.learn.checkpoint import load_state, load_tensors, save_state
 from gough.learn.config import TrainConfig
 from gough.learn.data import DatasetSpec, dataset
 from gough.learn.distributed import Team
@@ -41,6 +41,7 @@ from gough.learn.optim import SOAP
 from gough.learn.sampling import Batch, Stream
 from gough.learn.schedule import Clock, learning_rate
 from gough.platform import Platform
+from gough.whole_file import write_whole
 
 CHECKPOINT, START = "checkpoint.safetensors", "start.safetensors"
 TRAIN, TEST, ORDER = 0, 2, 3  # what a stream's samples are for

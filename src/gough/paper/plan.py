@@ -13,11 +13,11 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from gough.errors import GoughError
-from gough.learn.checkpoint import write_whole
 from gough.learn.config import DataConfig, ModelConfig, RunConfig, TrainConfig
 from gough.learn.models import MODELS
 from gough.learn.train import Trainer
 from gough.platform import Platform
+from gough.whole_file import write_whole
 
 WIDE = (100.0, 60.0)  # the wide workspace of the reference platform: +-mm, +-deg
 WIDE_OF_SIZE = 1 / 8  # the same for another platform: shifts, of its size

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gough.learn.checkpoint import write_whole
 from gough.paper import published
 from gough.paper.claims import claims
 from gough.paper.layout import NOTHING, milliseconds, number, page, percent, table
 from gough.paper.plan import BATCH, machine_of
 from gough.paper.study import Study
+from gough.whole_file import write_whole
 
 TITLE = "The DisGNet paper's experiments, run again"
 DISCUSSION, PAGE = "discussion.md", "report.html"

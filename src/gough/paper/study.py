@@ -12,7 +12,6 @@ import torch
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.learn.checkpoint import write_whole
 from gough.learn.environment import environment
 from gough.learn.evaluate import held_out
 from gough.learn.export import NETWORK
@@ -22,6 +21,7 @@ from gough.paper.plan import SETS, Plan, machine_of
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.seeds.network import NetworkSeed
+from gough.whole_file import write_whole
 
 PLAN, METRICS = "plan.json", "metrics.csv"
 

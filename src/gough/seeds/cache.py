@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from gough.errors import GoughError
 from gough.platform import Platform
 from gough.seeds.polynomial import Polynomial, monomials
+from gough.whole_file import replacing
 
 VERSION = 1  # of the fit: raise it when polynomials fitted before are no longer right
 
@@ -51,12 +53,7 @@ def _read(path: Path, degree: int) -> Polynomial | None:
 
 
 def _write(path: Path, made: Polynomial) -> None:
-    """Beside the target, then renamed: another process sees all of it or nothing."""
-    try:
+    with suppress(OSError, GoughError):  # a full disk costs the next process a second, no more
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        with os.fdopen(handle, "wb") as file:
+        with replacing(path) as file:
             np.savez(file, coefficients=made.coefficients, scaling=made.scaling, anchor=made.anchor)
-        os.replace(temporary, path)
-    except OSError:
-        return  # a read-only or full disk costs the next process a second, nothing else

@@ -8,11 +8,13 @@ import os
 import stat
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from gough import Platform
 from gough.errors import GoughError
-from gough.whole_file import replacing
+from gough.whole_file import replacing, write_whole
 
 
 def test_the_new_file_takes_the_place_of_the_old_and_its_permissions(tmp_path):
@@ -69,13 +71,36 @@ def test_a_link_goes_on_pointing_at_the_file(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("", "is a folder"), ("none/poses.csv", "make it first"), ("pipe.csv", "a device or a pipe")],
+    [("", "is a folder"), ("none/poses.csv", "make it first")],
 )
 def test_targets_that_cannot_be_files(tmp_path, name, words):
-    os.mkfifo(tmp_path / "pipe.csv")
     with pytest.raises(GoughError, match=words), replacing(tmp_path / name):
         pass
-    assert os.listdir(tmp_path) == ["pipe.csv"]
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_machine_is_saved_through_a_link_and_into_a_pipe_which_both_stay(tmp_path):
+    platform = Platform.load("reference")
+    link, pipe, real = tmp_path / "link.toml", tmp_path / "pipe.toml", tmp_path / "real.toml"
+    link.symlink_to(real)  # its target is yet to be made
+    platform.save(link)
+    assert link.is_symlink()
+    assert Platform.load(real) == platform
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as reader:
+        text = reader.submit(pipe.read_text)
+        platform.save(pipe)
+        assert text.result(10) == real.read_text()
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert sorted(os.listdir(tmp_path)) == ["link.toml", "pipe.toml", "real.toml"]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_a_device_is_written_directly_and_its_errors_are_named():
+    write_whole(os.devnull, b"text")
+    assert stat.S_ISCHR(os.stat(os.devnull).st_mode)
+    with pytest.raises(GoughError, match="/dev/full: cannot be written: the disk is full"):
+        write_whole("/dev/full", b"text")
 
 
 def test_a_signal_right_after_the_file_is_made_leaves_nothing(tmp_path, monkeypatch):
@@ -91,7 +116,7 @@ def test_a_signal_right_after_the_file_is_made_leaves_nothing(tmp_path, monkeypa
 
 KILLED = """
 import os, signal, sys
-from gough.files.replace import replacing
+from gough.whole_file import replacing
 with replacing(sys.argv[1]) as file:
     file.write(b"half")
     file.flush()
