@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -61,3 +61,13 @@ def _digest(folder: Path) -> str:
     for path in sorted(folder.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+def inner(function: Function | None = None, *, fast: bool = True) -> Any:
+    """Compile a function that only compiled code calls, for use as `@inner`.
+
+    It gets no entry from Python and no cache file, which saves half of its compile time: it
+    becomes part of its callers, and those are cached.
+    """
+    decorate = jit(fast=fast, cache=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return decorate if function is None else decorate(function)
