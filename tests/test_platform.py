@@ -123,7 +123,7 @@ FIRST = "375.877"  # base[0][0]
 HOME = "wxyz = [1.0, 0.0, 0.0, 0.0]"
 WRONG_TOML = {
     "a field is missing": (TOML.replace("moving", "moved"), "moving: missing; expected six rows"),
-    "home is missing": (TOML.replace("[home]", "[house]"), "home: missing; expected a [home]"),
+    "home is missing": (TOML.replace("[home]", "[house]"), "home: missing (is 'house' meant"),
     "empty": ("", "base: missing; expected six rows [x, y, z]"),
     "unknown field": (
         "pivots = [0, 0, 1]\n" + TOML,
@@ -159,7 +159,7 @@ WRONG_TOML = {
         "base: rows of unequal length; their lengths are [2, 3, 3, 3, 3, 3]",
     ),
     "a number for joints": ("base = 5\n" + TOML[TOML.index("moving") :],
-                            "base: expected shape (6, 3), got shape ()"),
+                            "base: expected shape (6, 3), found one number"),
     "text for joints": ("base = '5'\n" + TOML[TOML.index("moving") :],
                         "base: expected a number, found '5'"),
     "unknown legs": (
@@ -170,15 +170,15 @@ WRONG_TOML = {
     "unit is no text": (TOML.replace('"mm"', "[1]"), "unit: expected text, found [1]"),
     "no position": (TOML.replace("position =", "wxyz =").replace(HOME, ""),
                     "home.position: missing; expected [x, y, z]"),
-    "flat position": (TOML.replace("0.0, 600.0", "600.0"), "home.position: expected shape (3,), g"),
+    "flat position": (TOML.replace("0.0, 600.0", "600.0"), "home.position: expected 3 num"),
     "zero quaternion": (TOML.replace("wxyz = [1", "wxyz = [0"), "home.wxyz: a quaternion of zeros"),
-    "quaternion of three": (TOML.replace(HOME, "wxyz = [1, 0, 0]"), "home.wxyz: expected shape (4"),
+    "quaternion of three": (TOML.replace(HOME, "wxyz = [1, 0, 0]"), "home.wxyz: expected 4 num"),
     "two rotations": (
         TOML.replace(HOME, HOME + "\neuler_deg = [0, 0, 0]"),
         "home: give wxyz or euler_deg, not both",
     ),
-    "two angles": (TOML.replace(HOME, "euler_deg = [0, 0]"), "home.euler_deg: expected shape (3,)"),
-    "pivot": ("pivot = [1, 2]\n" + TOML, "pivot: expected shape (3,), got shape (2,)"),
+    "two angles": (TOML.replace(HOME, "euler_deg = [0, 0]"), "home.euler_deg: expected 3 numbers"),
+    "pivot": ("pivot = [1, 2]\n" + TOML, "pivot: expected 3 numbers, found 2 numbers"),
     "stroke of five": ("stroke = [[1, 2], [1, 2]]\n" + TOML, "stroke: expected [lowest, highest]"),
     "stroke upside down": ("stroke = [800, 500]\n" + TOML, "stroke[0]: expected lowest below high"),
     "stroke of NaN": ("stroke = [500, nan]\n" + TOML, "stroke[0]: expected lowest below highest"),
@@ -214,7 +214,7 @@ WRONG_TOML = {
     ),
     "rod is a list": (
         ROTARY_TOML.replace("rod_length = 0.085", "rod_length = [0.085]"),
-        "rotary.rod_length: expected one number, got shape (1,)",
+        "rotary.rod_length: expected one number, found 1 number in a list",
     ),
     "rod too long": (
         ROTARY_TOML.replace("rod_length = 0.085", "rod_length = 0.2"),
@@ -226,7 +226,7 @@ WRONG_TOML = {
     ),
     "branch of five": (
         ROTARY_TOML.replace("branch = [-1.0, ", "branch = ["),
-        "rotary.branch: expected shape (6,), got shape (5,)",
+        "rotary.branch: expected 6 numbers, found 5 numbers",
     ),
     "skew axes": (
         ROTARY_TOML.replace("0.8660247", "0.9"),
@@ -285,8 +285,8 @@ GOOD = {"base": REFERENCE.base, "moving": REFERENCE.moving, "home": (0, 0, 600)}
 LINE = np.arange(18.0).reshape(6, 3)
 WRONG_ARGUMENTS = [
     ({"base": None}, "base: expected a number, found None"),
-    ({"base": np.zeros((2, 6, 3))}, "base: expected shape (6, 3), got shape (2, 6, 3)"),
-    ({"moving": REFERENCE.moving[:, :2]}, "moving: expected shape (6, 3), got shape (6, 2)"),
+    ({"base": np.zeros((2, 6, 3))}, "base: expected shape (6, 3), found shape (2, 6, 3)"),
+    ({"moving": REFERENCE.moving[:, :2]}, "moving: expected shape (6, 3), found shape (6, 2)"),
     ({"moving": np.full((6, 3), "a")}, "moving[0][0]: expected a number, found 'a'"),
     ({"moving": REFERENCE.moving * 1j}, "moving[0][0]: expected a number, found 114.907j"),
     ({"base": LINE}, "base: all six joints lie on one line"),
@@ -296,7 +296,7 @@ WRONG_ARGUMENTS = [
         "base[0], base[1] and moving[0], moving[1]: legs 1 and 2 share both joints",
     ),
     ({"home": "up"}, "home: expected a number, found 'up'"),
-    ({"home": (0, 0)}, "home: expected shape (3,), got shape (2,)"),
+    ({"home": (0, 0)}, "home: expected 3 numbers, found 2 numbers"),
     ({"home": Pose(np.zeros((2, 3)))}, "home: expected one pose, found batch axes (2,)"),
     ({"home": Pose((np.nan, 0, 0))}, "home.position[0]: expected a finite number, found nan"),
     (
@@ -327,7 +327,7 @@ def test_wrong_arguments_are_named(arguments: dict, message: str) -> None:
         ((-1, 1), "workspace.translation[0]: expected [lowest, highest], found [1.0, -1.0]"),
         (("a", 1), "workspace.translation: expected a number, found 'a'"),
         ((1, np.nan), "workspace.rotation_deg[0][0]: expected a finite number, found nan"),
-        (([[1, 2]] * 2, 1), "workspace.translation: expected shape (3, 2), got shape (2, 2)"),
+        (([[1, 2]] * 2, 1), "workspace.translation: expected shape (3, 2), found shape (2, 2)"),
     ],
 )
 def test_wrong_workspaces_are_named(box: tuple, message: str) -> None:

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import RigidTransform, Rotation
 from support import BATCHES, Floats, assert_same_pose
 
-from gough import GoughError, Pose
+from gough import GoughError, Platform, Pose
 
 ONE = Pose((1.0, 2.0, 3.0), (0.5, 0.5, -0.5, 0.5))
 
@@ -361,3 +361,42 @@ def test_rows_of_nan_are_no_scipy_rotation() -> None:
     pose = Pose.trusted(np.full((2, 3), np.nan), np.full((2, 4), np.nan))
     with pytest.raises(GoughError, match=r"rows of NaN.*solution\.pose\[solution\.usable\]"):
         pose.as_scipy()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "right-handed"),
+        (np.diag([0.0, 0.0, 0.0, 1.0]), "expected matrices with R R"),
+        (np.diag([2.0, 2.0, 2.0, 1.0]), "scale factor"),
+        (np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [5, 6, 7, 1]]), "transposed"),
+    ],
+)
+def test_matrices_that_are_no_poses_are_refused(change: Floats, message: str) -> None:
+    rows = np.stack([np.eye(4), change])
+    with pytest.raises(GoughError, match=message):
+        Pose.from_matrix(rows)
+
+
+def test_masked_entries_are_read_as_nan() -> None:
+    position = np.ma.masked_array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], [[0, 0, 0], [0, 1, 0]])
+    pose = Pose(position)
+    assert np.isnan(pose.position[1, 1])
+    assert np.isfinite(pose.position[0]).all()
+
+
+def test_batch_axes_that_do_not_fit_are_refused() -> None:
+    two, three = Pose.identity((2,)), Pose.identity((3,))
+    for action in (
+        lambda: two.distance(three),
+        lambda: two @ three,
+        lambda: Pose(np.zeros((2, 3)), three.wxyz),
+    ):
+        with pytest.raises(GoughError, match="batch axes"):
+            action()
+
+
+@pytest.mark.parametrize(("count", "seed"), [(-1, 0), (1.5, 0), (2, -1)])
+def test_counts_of_sampled_poses_are_checked(count: int, seed: int) -> None:
+    with pytest.raises(GoughError, match="expected a whole number of 0 or more"):
+        Platform.load("reference").sample_poses(count, seed)

@@ -1,4 +1,4 @@
-"""Arrays from a caller, checked once at the edge; one way of wording what is wrong."""
+"""Checks of arrays that a caller passes, made once where they enter, with uniform messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LARGEST = 1e100  # products of a few numbers below it do not overflow
 
 
 def as_batch(name: str, value: ArrayLike, trailing: tuple[int, ...]) -> Array:
-    """`value` as a float64 array whose last axes are `trailing`, any axes before them."""
+    """Return `value` as a float64 array whose last axes are `trailing`, masked entries NaN."""
     array = _to_float(name, value)
     n = len(trailing)
     if array.ndim < n or array.shape[array.ndim - n :] != trailing:
@@ -24,12 +24,14 @@ def as_batch(name: str, value: ArrayLike, trailing: tuple[int, ...]) -> Array:
 
 
 def frozen(array: Array) -> Array:
-    """The same array, made read-only."""
+    """Make an array read-only and return it."""
     array.flags.writeable = False
     return array
 
 
 def _to_float(name: str, value: ArrayLike) -> Array:
+    if isinstance(value, np.ma.MaskedArray):
+        return _to_float(name, value.astype(np.float64).filled(np.nan))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return value
     try:
@@ -52,7 +54,7 @@ def _row_lengths(value: object) -> str:
 
 
 def _refuse_non_numbers(name: str, value: object) -> None:
-    """GoughError with the index of the first entry that is not a real number."""
+    """Raise GoughError with the index of the first entry that is not a real number."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
@@ -71,7 +73,7 @@ def _is_number(value: object) -> bool:
 
 
 def platform_numbers(name: str, value: ArrayLike) -> Array:
-    """`value` as a float64 array of any shape, for a field of a platform."""
+    """Return `value` as a float64 array of any shape, for a field of a platform."""
     try:
         array = as_batch(name, value, ())
         _refuse_non_numbers(name, value)  # NumPy takes [0, True] for two numbers
@@ -80,12 +82,18 @@ def platform_numbers(name: str, value: ArrayLike) -> Array:
     return array
 
 
+def _count(shape: tuple[int, ...]) -> str:
+    """Shape of an array in words, as far as words are clearer."""
+    if len(shape) == 1:
+        return "1 number in a list" if shape == (1,) else f"{shape[0]} numbers"
+    return f"shape {shape}" if shape else "one number"
+
+
 def platform_field(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """A frozen copy of `value`, which must have `shape` and hold no NaN or infinity."""
+    """Return a read-only copy of `value`, which must have `shape` and be finite."""
     array = np.array(platform_numbers(name, value) + 0.0)  # a copy, without negative zeros
     if array.shape != shape:
-        wanted = f"shape {shape}" if shape else "one number"
-        raise PlatformError(f"{name}: expected {wanted}, got shape {array.shape}")
+        raise PlatformError(f"{name}: expected {_count(shape)}, found {_count(array.shape)}")
     usable = np.abs(array) < LARGEST
     if not np.all(usable):
         place = "".join(f"[{i}]" for i in np.argwhere(~usable)[0]) if shape else ""

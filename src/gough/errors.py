@@ -18,7 +18,7 @@ class InputError(GoughError):
 
 
 def suggestion(name: str, choices: Iterable[str]) -> str:
-    """What follows an unknown name: the choice most like it, if one is."""
+    """Text to follow an unknown name: the choice most like it, if there is one."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, list(choices), n=1)

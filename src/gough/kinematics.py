@@ -27,7 +27,7 @@ def joint_positions(platform: Platform, pose: Pose) -> Array:
 
 
 def strut_vectors(platform: Platform, pose: Pose) -> Array:
-    """From base joint to platform joint, (..., 6, 3) [platform unit].
+    """Vectors from base joint to platform joint, (..., 6, 3) [platform unit].
 
     For rotary legs the base joint is the arm's centre here, not its tip.
     """
@@ -35,7 +35,7 @@ def strut_vectors(platform: Platform, pose: Pose) -> Array:
 
 
 def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
-    """Inverse kinematics: the readings of the six legs, (..., 6).
+    """Inverse kinematics: readings of the six legs, (..., 6).
 
     Args:
         pose: batch axes (...), or a table of N poses (see `Pose.from_frame`).
@@ -47,13 +47,19 @@ def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
 
     Raises:
         GoughError: neither poses nor a table, or a table with other columns.
+
+    Example:
+        >>> import gough
+        >>> platform = gough.Platform.load("rubin_simulink")
+        >>> gough.leg_lengths(platform, platform.home).shape
+        (6,)
     """
     vectors = strut_vectors(platform, as_pose(pose))
     return struts.readings(vectors, platform.zero_lengths, platform.rotary)
 
 
 def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Array, Array]:
-    """The telescopic hexapod that readings stand for: where its struts start, how long they are.
+    """Telescopic struts that readings stand for: their lower ends and lengths.
 
     Args:
         legs: readings (..., 6).
@@ -67,11 +73,19 @@ def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Arra
 
 
 def jacobian(platform: Platform, pose: Pose) -> Array:
-    """d legs / d twist, (..., 6, 6).
+    """Jacobian d readings / d twist, (..., 6, 6).
 
     The twist is (velocity of the pose's position, angular velocity), both in base
     coordinates. Units: 1 and [platform unit / rad], or [rad / platform unit] and 1 for rotary
     legs, whose rows are NaN where the motor cannot reach and infinite where arm and rod align.
+
+    Source: Merlet, Parallel Robots, 2nd ed., sec. 5.1.
+
+    Example:
+        >>> import gough
+        >>> platform = gough.Platform.load("reference")
+        >>> gough.jacobian(platform, platform.sample_poses(5)).shape
+        (5, 6, 6)
     """
     rods, rates = struts.rods_and_rates(strut_vectors(platform, pose), platform.rotary)
     rows = np.concatenate([rods, np.cross(_levers(platform, pose), rods)], axis=-1)
@@ -105,7 +119,7 @@ def assembly_sign(platform: Platform, pose: Pose) -> Array:
 
 
 def normalised_jacobian(platform: Platform, pose: Pose) -> Array:
-    """Rows (n_i, m_i) without units, (..., 6, 6); see `singularity_distance`."""
+    """Jacobian with rows (n_i, m_i), without units, (..., 6, 6); see `singularity_distance`."""
     rods, _ = struts.rods_and_rates(strut_vectors(platform, pose), platform.rotary)
     directions = rods / np.linalg.norm(rods, axis=-1, keepdims=True)
     levers = _levers(platform, pose)
@@ -114,7 +128,7 @@ def normalised_jacobian(platform: Platform, pose: Pose) -> Array:
 
 
 def _finite_rows(matrices: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Matrices (..., 6, 6) with those that hold NaN zeroed, and which (...) did not."""
+    """Matrices (..., 6, 6), zero where one held NaN, and a mask (...) of those without NaN."""
     known = np.all(np.isfinite(matrices), axis=(-2, -1))
     return np.where(known[..., None, None], matrices, 0.0), known
 

@@ -1,14 +1,14 @@
-"""What a hexapod is: twelve joints, a home pose, the kind of leg, limits and a unit."""
+"""A hexapod as data: twelve joints, a home pose, the kind of leg, limits and a unit."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,9 +25,9 @@ LegKind = Literal["telescopic", "length_change", "rotary"]
 COINCIDENT = 1e-9  # joints closer than this share of the platform's size are one point
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Platform:
-    """A Gough-Stewart platform. Leg i runs from base joint i to platform joint i.
+    """Gough-Stewart platform: leg i runs from base joint i to platform joint i.
 
     Where a pose (t, R) puts the platform joint p:  R (p - c) + c + t, with pivot c (zero
     unless given): the rotation is about the pivot, and t is how far the pivot has moved.
@@ -48,65 +48,67 @@ class Platform:
 
     Raises:
         PlatformError: naming the field, what was found and what was expected.
+
+    Example:
+        >>> import numpy as np, gough
+        >>> turn = np.radians([-15, 15, 105, 135, 225, 255])
+        >>> base = 500 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
+        >>> moving = np.roll(base * 0.6 @ np.diag([-1.0, -1.0, 1.0]), 3, axis=0)
+        >>> platform = gough.Platform(base, moving, home=(0, 0, 600), unit="mm")
+        >>> platform
+        Platform('unnamed', telescopic legs, size 1000 [mm])
     """
 
     base: Array
     moving: Array
-    home: Pose = Pose((0.0, 0.0, 0.0))
-    _: KW_ONLY
-    unit: str = ""
-    name: str = "unnamed"
-    legs: LegKind = "telescopic"
-    stroke: Array | None = None
-    pivot: Array | None = None
-    workspace: Workspace | None = None
-    rotary: RotaryArms | None = None
+    home: Pose
+    unit: str
+    name: str
+    legs: LegKind
+    stroke: Array | None
+    pivot: Array | None
+    workspace: Workspace | None
+    rotary: RotaryArms | None
 
-    if TYPE_CHECKING:  # what may be passed is wider than what is held
-
-        def __init__(
-            self,
-            base: ArrayLike,
-            moving: ArrayLike,
-            home: Pose | ArrayLike = ...,
-            *,
-            unit: str = ...,
-            name: str = ...,
-            legs: LegKind = ...,
-            stroke: ArrayLike | None = ...,
-            pivot: ArrayLike | None = ...,
-            workspace: Workspace | None = ...,
-            rotary: RotaryArms | None = ...,
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
-        for name in ("base", "moving"):
-            put(name, _joints(name, getattr(self, name)))
-        put("home", _home(self.home))
-        for name in ("unit", "name"):
-            if not isinstance(getattr(self, name), str):
-                raise PlatformError(f"{name}: expected text, found {getattr(self, name)!r}")
-        if self.legs not in get_args(LegKind):
-            kinds = ", ".join(get_args(LegKind))
-            raise PlatformError(f"legs: expected one of {kinds}; found {self.legs!r}")
-        for name, kind in (("rotary", RotaryArms), ("workspace", Workspace)):
-            part = getattr(self, name)
-            if part is not None and not isinstance(part, kind):
-                raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
-        if (self.legs == "rotary") != (self.rotary is not None):
-            need = "needs" if self.legs == "rotary" else "must not have"
-            raise PlatformError(f"rotary: a platform with {self.legs} legs {need} this table")
-        if self.pivot is not None:
-            put("pivot", platform_field("pivot", self.pivot, (3,)))
-        self._check_coincident_joints()
-        self._check_stroke(put)
+    def __init__(
+        self,
+        base: ArrayLike,
+        moving: ArrayLike,
+        home: Pose | ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        unit: str = "",
+        name: str = "unnamed",
+        legs: LegKind = "telescopic",
+        stroke: ArrayLike | None = None,
+        pivot: ArrayLike | None = None,
+        workspace: Workspace | None = None,
+        rotary: RotaryArms | None = None,
+    ) -> None:
+        for field, text in (("unit", unit), ("name", name)):
+            if not isinstance(text, str):
+                raise PlatformError(f"{field}: expected text, found {text!r}")
+        _check_kind(legs, workspace, rotary)
+        fields = {
+            "base": _joints("base", base),
+            "moving": _joints("moving", moving),
+            "home": _home(home),
+            "unit": unit,
+            "name": name,
+            "legs": legs,
+            "pivot": None if pivot is None else platform_field("pivot", pivot, (3,)),
+            "workspace": workspace,
+            "rotary": rotary,
+        }
+        for field, value in fields.items():
+            object.__setattr__(self, field, value)
+        self._check_joints()
+        object.__setattr__(self, "stroke", self._checked_stroke(stroke))
 
     # ---- files ------------------------------------------------------------------------
 
     @staticmethod
     def load(name_or_path: str | Path) -> Platform:
-        """A catalog machine by name, or a platform from the path of a .toml file.
+        """Load a catalog machine by name, or a platform from the path of a .toml file.
 
         Raises:
             PlatformError: no such name or file, or a field that is missing or wrong.
@@ -123,7 +125,7 @@ class Platform:
         return catalog_names()
 
     def to_toml(self) -> str:
-        """This platform as TOML text; `load` of it gives an equal platform."""
+        """Return this platform as TOML text, from which `load` makes an equal platform."""
         from gough.platform_file import to_toml
 
         return to_toml(self)
@@ -170,7 +172,7 @@ class Platform:
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
     def to_dict(self) -> dict:
-        """Plain lists, numbers and text: the tables of the TOML file."""
+        """Return the tables of the TOML file as plain lists, numbers and text."""
         out: dict = {"name": self.name, "unit": self.unit, "legs": self.legs}
         out |= {"base": self.base.tolist(), "moving": self.moving.tolist()}
         for key in ("pivot", "stroke"):
@@ -186,14 +188,14 @@ class Platform:
         return out
 
     def with_workspace(self, translation: ArrayLike, rotation_deg: ArrayLike) -> Platform:
-        """The same machine meant for other poses; arguments as `Workspace.about_home`."""
+        """Copy with another workspace; arguments as `Workspace.about_home`."""
         return replace(self, workspace=Workspace.about_home(translation, rotation_deg))
 
     def with_origin_at(self, point: ArrayLike) -> Platform:
-        """The same machine whose poses tell where `point` (3,) of the platform is.
+        """Copy whose poses give the position of `point` (3,) of the platform [platform unit].
 
-        A tool tip, a mirror's vertex, a camera: positions in the answers become that point's,
-        in base coordinates, and the pose still rotates about it.
+        The point may be a tool tip, a mirror's vertex or a camera. Positions are that point's, in
+        base coordinates, and rotations are about it.
         """
         p = platform_field("point", point, (3,))
         if self.pivot is not None:
@@ -204,7 +206,7 @@ class Platform:
     # ---- workspace --------------------------------------------------------------------
 
     def sample_poses(self, count: int, seed: int = 0) -> Pose:
-        """Poses drawn evenly from the workspace's box, batch (count,), from a fixed seed.
+        """Draw poses evenly from the workspace's box, batch (count,), from a fixed seed.
 
         Raises:
             PlatformError: the platform states no workspace.
@@ -238,7 +240,7 @@ class Platform:
     def _home_struts(self) -> Array:
         return self._moving_at_home() - self.base
 
-    def _check_coincident_joints(self) -> None:
+    def _check_joints(self) -> None:
         at_home = self._moving_at_home()
         for i, j in combinations(range(6), 2):
             gaps = [np.linalg.norm(p[i] - p[j]) for p in (self.base, self.moving)]
@@ -262,34 +264,35 @@ class Platform:
                         f"the same point {self.base[i].tolist()}"
                     )
 
-    def _check_stroke(self, put) -> None:
-        what = "motor angles" if self.legs == "rotary" else "leg readings"
-        home = self.home_legs
-        if not np.all(np.isfinite(home)):
-            leg = int(np.argmin(np.isfinite(home)))
+        if not np.all(np.isfinite(self.home_legs)):
+            leg = int(np.argmin(np.isfinite(self.home_legs)))
             raise PlatformError(
                 f"home: the arm and rod of leg {leg + 1} cannot reach the home pose; check home, "
                 "rotary.arm_length and rotary.rod_length"
             )
-        if self.stroke is None:
-            return
-        limits = platform_numbers("stroke", self.stroke)
+
+    def _checked_stroke(self, stroke: ArrayLike | None) -> Array | None:
+        """Stroke as (6, 2), each lowest below highest and home between them."""
+        if stroke is None:
+            return None
+        limits = platform_numbers("stroke", stroke)
         if limits.shape not in ((2,), (6, 2)):
             raise PlatformError(
                 f"stroke: expected [lowest, highest] or six such pairs, got shape {limits.shape}"
             )
+        readings = "motor angles" if self.legs == "rotary" else "leg readings"
         limits = frozen(np.broadcast_to(limits, (6, 2)) + 0.0)
-        put("stroke", limits)
-        for i, (low, high) in enumerate(limits):
+        for i, ((low, high), home) in enumerate(zip(limits, self.home_legs, strict=True)):
             if not low < high:
                 raise PlatformError(
                     f"stroke[{i}]: expected lowest below highest, found [{low}, {high}]"
                 )
-            if not low <= home[i] <= high:
+            if not low <= home <= high:
                 raise PlatformError(
-                    f"stroke[{i}]: forbids the home pose: {what} at home are {home[i]:.6g}, "
+                    f"stroke[{i}]: forbids the home pose: {readings} at home are {home:.6g}, "
                     f"allowed are {low:.6g} to {high:.6g}; change home or stroke"
                 )
+        return limits
 
     # ---- identity ---------------------------------------------------------------------
 
@@ -329,6 +332,19 @@ class Platform:
             listed = "; ".join(f"{axis} {vector(side, ' to ')} [{u}]" for axis, side, u in ranges)
             notes.append(f"workspace from home: {listed}")
         return notes
+
+
+def _check_kind(legs: str, workspace: object, rotary: object) -> None:
+    """Raise unless the kind of leg is known and the parts are what it needs."""
+    if legs not in get_args(LegKind):
+        kinds = ", ".join(get_args(LegKind))
+        raise PlatformError(f"legs: expected one of {kinds}; found {legs!r}")
+    for name, kind, part in (("rotary", RotaryArms, rotary), ("workspace", Workspace, workspace)):
+        if part is not None and not isinstance(part, kind):
+            raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
+    if (legs == "rotary") != (rotary is not None):
+        need = "needs" if legs == "rotary" else "must not have"
+        raise PlatformError(f"rotary: a platform with {legs} legs {need} this table")
 
 
 def _joints(name: str, value: ArrayLike) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 
@@ -33,7 +34,7 @@ def catalog_names() -> list[str]:
 
 
 def catalog_text(name: str) -> str:
-    """The TOML of a catalog machine, comments and all.
+    """Text of a catalog machine's TOML file, with its comments.
 
     Raises:
         PlatformError: no such machine; the text lists those there are.
@@ -49,7 +50,7 @@ def catalog_text(name: str) -> str:
 
 
 def load(name_or_path: str | Path) -> Platform:
-    """See `Platform.load`."""
+    """Load a platform; see `Platform.load`."""
     text_name = str(name_or_path)
     if not text_name.endswith(".toml"):
         return from_toml(catalog_text(text_name), where=text_name)
@@ -66,7 +67,7 @@ def load(name_or_path: str | Path) -> Platform:
 
 
 def from_toml(text: str, where: str = "platform") -> Platform:
-    """A platform from TOML text; errors begin with `where`."""
+    """Make a platform from TOML text; errors begin with `where`."""
     try:
         return _from_dict(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
@@ -80,7 +81,7 @@ def from_toml(text: str, where: str = "platform") -> Platform:
 
 
 def to_toml(platform: Platform) -> str:
-    """See `Platform.to_toml`."""
+    """Write a platform as TOML text; see `Platform.to_toml`."""
     facts = platform.to_dict()
     top = {k: v for k, v in facts.items() if not isinstance(v, dict)}
     lines = [f"{key} = {_value(value)}" for key, value in top.items()]
@@ -91,7 +92,7 @@ def to_toml(platform: Platform) -> str:
 
 
 def save(platform: Platform, path: str | Path) -> None:
-    """See `Platform.save`."""
+    """Write a platform's TOML file; see `Platform.save`."""
     try:
         write_whole(path, to_toml(platform).encode())
     except GoughError as error:
@@ -102,7 +103,9 @@ def _from_dict(facts: dict) -> Platform:
     for key in REQUIRED:
         if key not in facts:
             what = "a [home] table" if key == "home" else "six rows [x, y, z]"
-            raise PlatformError(f"{key}: missing; expected {what}")
+            near = get_close_matches(key, set(facts) - {*REQUIRED, *OPTIONAL}, n=1)
+            misspelt = f" (is {near[0]!r} meant as {key}?)" if near else ""
+            raise PlatformError(f"{key}: missing{misspelt}; expected {what}")
     _known("", facts, REQUIRED + OPTIONAL)
     for name, keys in TABLES.items():
         if name in facts:
@@ -123,7 +126,7 @@ def _from_dict(facts: dict) -> Platform:
 
 
 def _table(kind, name: str, facts: dict):
-    """An instance of `kind` from the table `name`, all of whose keys must be there."""
+    """Make an instance of `kind` from the table `name`, all of whose keys must be there."""
     if name not in facts:
         return None
     missing = [k for k in TABLES[name] if k not in facts[name]]
@@ -157,7 +160,7 @@ def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:
 
 
 def _value(value: object) -> str:
-    """One TOML value; rows of numbers one to a line."""
+    """Write one TOML value; rows of numbers one to a line."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list) and value and isinstance(value[0], list):

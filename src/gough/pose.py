@@ -42,7 +42,7 @@ class Pose:
     wxyz: Array
 
     def __init__(self, position: ArrayLike, wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> None:
-        """Broadcasts the two against each other and normalises the quaternion.
+        """Broadcast the two against each other and normalise the quaternion.
 
         Raises:
             GoughError: wrong shapes, or a quaternion of length zero or beyond 1e+-100.
@@ -55,13 +55,13 @@ class Pose:
             raise GoughError(_no_rotation(q, norm[..., 0]))
         # rows of unit length to rounding stay as they are: making a pose twice changes no bit
         q = q / np.where(np.abs(norm - 1) < 1e-15, 1.0, norm)
-        batch = np.broadcast_shapes(t.shape[:-1], q.shape[:-1])
+        batch = _common_batch("wxyz", t.shape[:-1], q.shape[:-1])
         object.__setattr__(self, "position", np.broadcast_to(t, (*batch, 3)))
         object.__setattr__(self, "wxyz", np.broadcast_to(q, (*batch, 4)))
 
     @classmethod
     def trusted(cls, position: Array, wxyz: Array) -> Pose:
-        """From arrays known to be right -- equal batch axes, unit quaternions -- unchecked."""
+        """Make poses from arrays of equal batch axes and unit quaternions, without checks."""
         pose = object.__new__(cls)
         object.__setattr__(pose, "position", position)
         object.__setattr__(pose, "wxyz", wxyz)
@@ -71,28 +71,44 @@ class Pose:
 
     @classmethod
     def identity(cls, batch: tuple[int, ...] = ()) -> Pose:
-        """The pose that moves nothing, with batch axes `batch`."""
+        """Identity pose, with batch axes `batch`."""
         return cls(np.zeros((*batch, 3)))
 
     @classmethod
     def from_rotation(cls, position: ArrayLike, rotation: ArrayLike) -> Pose:
-        """From (..., 3) and rotation matrices (..., 3, 3)."""
-        return cls(position, quaternion.from_matrix(as_batch("rotation", rotation, (3, 3))))
+        """Make poses from positions (..., 3) and rotation matrices (..., 3, 3).
+
+        Raises:
+            GoughError: a matrix that is not a rotation to 1e-6: scaled, mirrored, or all zeros.
+        """
+        matrices = as_batch("rotation", rotation, (3, 3))
+        _check_rotations(matrices)
+        return cls(position, quaternion.from_matrix(matrices))
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Pose:
-        """From homogeneous matrices (..., 4, 4)."""
+        """Make poses from homogeneous matrices (..., 4, 4), with the position in the last column.
+
+        Raises:
+            GoughError: a last row that is not 0, 0, 0, 1, or a part that is not a rotation.
+        """
         m = as_batch("matrix", matrix, (4, 4))
+        wrong = np.any(np.abs(m[..., 3, :] - [0.0, 0.0, 0.0, 1.0]) > 1e-9, axis=-1)
+        if np.any(wrong):
+            raise GoughError(
+                f"matrix: expected a last row 0, 0, 0, 1, found {m[wrong][0, 3].tolist()}; is the "
+                "matrix transposed?"
+            )
         return cls.from_rotation(m[..., :3, 3], m[..., :3, :3])
 
     @classmethod
     def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
-        """From (..., 3) and Euler angles (..., 3) [rad], R = Rx(a) Ry(b) Rz(c)."""
+        """Make poses from positions and Euler angles (..., 3) [rad], R = Rx(a) Ry(b) Rz(c)."""
         return cls(position, quaternion.from_euler(as_batch("angles", angles, (3,))))
 
     @classmethod
     def from_rotation_vector(cls, position: ArrayLike, vector: ArrayLike) -> Pose:
-        """From (..., 3) and rotation vectors (..., 3) [rad] (axis times angle)."""
+        """Make poses from positions and rotation vectors (..., 3), axis times angle [rad]."""
         return cls(position, quaternion.from_rotation_vector(as_batch("vector", vector, (3,))))
 
     @classmethod
@@ -110,10 +126,10 @@ class Pose:
 
     @classmethod
     def from_rpy(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
-        """From (..., 3) and roll, pitch, yaw (..., 3) [rad], R = Rz(yaw) Ry(pitch) Rx(roll).
+        """Make poses from positions (..., 3) and roll, pitch, yaw (..., 3) [rad].
 
-        That is a turn about the fixed x, then y, then z axis: what ROS, URDF and most vehicles
-        mean by it. It is not `from_euler`, whose turns come in the other order.
+        R = Rz(yaw) Ry(pitch) Rx(roll): rotations about the fixed x, then y, then z axis, the
+        convention of ROS, URDF and most vehicles. `from_euler` takes the other order.
         """
         rpy = as_batch("angles", angles, (3,))
         inverse = quaternion.from_euler(-rpy)  # Rx(-r) Ry(-p) Rz(-y)
@@ -121,12 +137,12 @@ class Pose:
 
     @classmethod
     def from_scipy(cls, position: ArrayLike, rotation: Rotation) -> Pose:
-        """From (..., 3) and a `scipy.spatial.transform.Rotation`, one or as many as positions."""
+        """Make poses from positions (..., 3) and a `scipy.spatial.transform.Rotation`."""
         return cls(position, np.roll(rotation.as_quat(), 1, axis=-1))
 
     @classmethod
     def from_frame(cls, frame: Table) -> Pose:
-        """From a pandas, polars, pyarrow or other Arrow table, batch (N,).
+        """Make poses from a pandas, polars, pyarrow or other Arrow table, batch (N,).
 
         Columns x, y, z and qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg
         (R = Rx Ry Rz); others are ignored. Rows with absent values, or whose quaternion's length
@@ -168,7 +184,7 @@ class Pose:
         return -quaternion.to_euler(quaternion.conjugate(self.wxyz))
 
     def as_scipy(self) -> Rotation:
-        """The rotations as a `scipy.spatial.transform.Rotation`; the position is not in it.
+        """Return the rotations as a `scipy.spatial.transform.Rotation`, without the positions.
 
         Raises:
             GoughError: a row of NaN, which SciPy has no rotation for.
@@ -200,7 +216,7 @@ class Pose:
 
     @property
     def batch(self) -> tuple[int, ...]:
-        """The batch axes."""
+        """Batch axes."""
         return self.position.shape[:-1]
 
     def __len__(self) -> int:
@@ -217,12 +233,12 @@ class Pose:
         return Pose(self.position[(*rows, slice(None))], self.wxyz[(*rows, slice(None))])
 
     def apply(self, points: ArrayLike) -> Array:
-        """R p + t for points (..., 3); the batch axes broadcast against the points' own."""
+        """Map points (..., 3) to R p + t; the batch axes broadcast against the points' own."""
         p = as_batch("points", points, (3,))
         return (self.rotation @ p[..., None])[..., 0] + self.position
 
     def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
-        """A table with a row for each pose; `from_frame` reads it.
+        """Return a table with a row for each pose, which `from_frame` reads.
 
         Args:
             kind: "pandas", "polars" or "pyarrow"; pandas unless given.
@@ -235,20 +251,32 @@ class Pose:
         return tables.make_frame(pose_table(self, angles), kind)
 
     def copy(self) -> Pose:
-        """A pose with arrays of its own."""
+        """Copy that shares no memory with this pose."""
         return Pose.trusted(self.position.copy(), self.wxyz.copy())
 
     def inverse(self) -> Pose:
-        """The pose that undoes this one."""
+        """Inverse poses: `pose @ pose.inverse()` is the identity."""
         wxyz = quaternion.conjugate(self.wxyz)
         return Pose(-(quaternion.to_matrix(wxyz) @ self.position[..., None])[..., 0], wxyz)
 
     def __matmul__(self, other: Pose) -> Pose:
-        """First `other`, then this one."""
+        """Composition: `other` first, then this pose."""
+        _common_batch("other", self.batch, other.batch)
         return Pose(self.apply(other.position), quaternion.product(self.wxyz, other.wxyz))
 
     def distance(self, other: Pose) -> tuple[Array, Array]:
-        """Distance of positions (...) [unit] and angle between orientations (...) [rad]."""
+        """Distance of positions (...) [platform unit] and angle between orientations (...) [rad].
+
+        Raises:
+            GoughError: batch axes that do not fit each other.
+
+        Example:
+            >>> from gough import Pose
+            >>> length, angle = Pose((0, 0, 3)).distance(Pose((0, 4, 0)))
+            >>> float(length), float(angle)
+            (5.0, 0.0)
+        """
+        _common_batch("other", self.batch, other.batch)
         length = np.linalg.norm(self.position - other.position, axis=-1)
         return length, quaternion.angle_between(self.wxyz, other.wxyz)
 
@@ -262,6 +290,31 @@ class Pose:
         count = "one pose" if not self.batch else f"{len(self.position.reshape(-1, 3)):,} poses"
         rows = rows_of(self.batch, lambda i: pose_cells(self[i] if i else self))
         return page(f"Pose: {count}", pose_heads(self.batch, ""), rows)
+
+
+def _common_batch(name: str, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
+    """Batch axes that two arrays broadcast to; GoughError where they do not fit."""
+    try:
+        return np.broadcast_shapes(a, b)
+    except ValueError:
+        raise GoughError(f"{name}: batch axes {b} do not fit those of the pose, {a}") from None
+
+
+def _check_rotations(matrices: Array) -> None:
+    """Raise GoughError unless matrices (..., 3, 3) are rotations to 1e-6; rows of NaN pass."""
+    square = matrices @ np.swapaxes(matrices, -1, -2)
+    skewed = np.any(np.abs(square - np.eye(3)) > 1e-6, axis=(-2, -1))
+    mirrored = np.linalg.det(np.where(np.isfinite(matrices), matrices, np.eye(3))) < 0
+    if np.any(skewed):
+        raise GoughError(
+            "rotation: expected matrices with R R^T = 1, found "
+            f"{matrices[skewed][0].round(6).tolist()}; is there a scale factor in it?"
+        )
+    if np.any(mirrored):
+        raise GoughError(
+            "rotation: expected right-handed matrices, det R = 1; found a mirrored one (det -1): "
+            f"{matrices[mirrored][0].round(6).tolist()}"
+        )
 
 
 def _no_rotation(wxyz: Array, norm: Array) -> str:

@@ -1,20 +1,18 @@
-"""The motor arms of a rotary (6-RSS) hexapod."""
+"""Motor arms of a rotary (6-RSS) hexapod."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from gough.checks import Array, platform_field
 from gough.errors import PlatformError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class RotaryArms:
-    """The motor arms of a 6-RSS hexapod. Base joint i is the tip of arm i,
+    """Motor arms of a 6-RSS hexapod. Base joint i is the tip of arm i,
 
         tip_i(q_i) = base_i + arm_length (cos q_i axis_x_i + sin q_i axis_y_i),
 
@@ -27,6 +25,9 @@ class RotaryArms:
         axis_y: (6, 3) unit vectors, where it points at angle +90 deg.
         branch: (6,) of +1 or -1: which of the two motor angles that reach a pose is meant,
             q = atan2(y, x) + branch * acos(...), with x, y along axis_x, axis_y.
+
+    Raises:
+        PlatformError: naming the field, what was found and what was expected.
     """
 
     arm_length: float
@@ -35,27 +36,27 @@ class RotaryArms:
     axis_y: Array
     branch: Array
 
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            arm_length: float,
-            rod_length: float,
-            axis_x: ArrayLike,
-            axis_y: ArrayLike,
-            branch: ArrayLike,
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        for name in ("arm_length", "rod_length"):
-            value = float(platform_field(f"rotary.{name}", getattr(self, name), ()))
+    def __init__(
+        self,
+        arm_length: float,
+        rod_length: float,
+        axis_x: ArrayLike,
+        axis_y: ArrayLike,
+        branch: ArrayLike,
+    ) -> None:
+        for name, given in (("arm_length", arm_length), ("rod_length", rod_length)):
+            value = float(platform_field(f"rotary.{name}", given, ()))
             if value <= 0:
                 raise PlatformError(f"rotary.{name}: expected a length above 0, found {value}")
             object.__setattr__(self, name, value)
-        for name, shape in (("axis_x", (6, 3)), ("axis_y", (6, 3)), ("branch", (6,))):
-            array = platform_field(f"rotary.{name}", getattr(self, name), shape)
-            object.__setattr__(self, name, array)
-        if not np.all(np.abs(self.branch) == 1):
+        for name, given, shape in (
+            ("axis_x", axis_x, (6, 3)), ("axis_y", axis_y, (6, 3)), ("branch", branch, (6,))
+        ):  # fmt: skip
+            object.__setattr__(self, name, platform_field(f"rotary.{name}", given, shape))
+        self._check_axes()
+
+    def _check_axes(self) -> None:
+        if any(abs(sign) != 1 for sign in self.branch):
             found = self.branch.tolist()
             raise PlatformError(f"rotary.branch: expected six of 1 or -1, found {found}")
         for i in range(6):

@@ -15,7 +15,7 @@ SHOWN = 5  # rows at the start and at the end of a batch
 def page(
     title: str, heads: Iterable[str], rows: Iterable[Iterable[str]], notes: Iterable[str] = ()
 ) -> str:
-    """A table below a title and above notes; all of them plain text.
+    """HTML of a table below a title and above notes, all given as plain text.
 
     No colours: the notebook's own theme, light or dark, gives them.
     """
@@ -27,7 +27,7 @@ def page(
 
 
 def rows_of(batch: tuple[int, ...], cells: Callable[[tuple[int, ...]], list[str]]) -> Iterator:
-    """Index and cells of the first and the last rows of a batch; of the only one of none."""
+    """Yield index and cells of the first and the last rows of a batch, or of a single item."""
     count = int(np.prod(batch))
     cut = count > 2 * SHOWN + 1
     for k in chain(range(SHOWN), range(count - SHOWN, count)) if cut else range(count):
@@ -39,7 +39,7 @@ def rows_of(batch: tuple[int, ...], cells: Callable[[tuple[int, ...]], list[str]
 
 
 def pose_heads(batch: tuple[int, ...], unit: str) -> list[str]:
-    """What stands above the index and `pose_cells`."""
+    """Column heads of a table of poses: its index, then those of `gough.pose.pose_cells`."""
     return ["row" if batch else "", *(length_head(axis, unit) for axis in "xyz"), *TURNS]
 
 
@@ -47,18 +47,18 @@ TURNS = ("rx [deg]", "ry [deg]", "rz [deg]")
 
 
 def length_head(name: str, unit: str) -> str:
-    """The head of a column of lengths."""
+    """Column head with its unit of length."""
     return f"{name} [{unit}]" if unit else name
 
 
 def number(value: ArrayLike, digits: str = ".4g") -> str:
-    """A number without a minus before zero; a dash where there is none."""
+    """Format a number, without a minus before zero; NaN becomes a dash."""
     real = float(np.asarray(value))
     return "–" if np.isnan(real) else f"{real:z{digits}}"
 
 
 def vector(values: ArrayLike, between: str = ", ") -> str:
-    """Numbers side by side."""
+    """Format numbers side by side."""
     return between.join(number(v, ".6g") for v in np.ravel(values))
 
 

@@ -1,22 +1,21 @@
-"""The poses a machine is meant for."""
+"""The box of poses that a machine is meant for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gough import quaternion
 from gough.checks import Array, platform_field, platform_numbers
-from gough.errors import PlatformError
+from gough.errors import GoughError, PlatformError
 from gough.pose import Pose
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Workspace:
-    """The poses a machine is meant for: a box about home.
+    """Box of poses about home that a machine is meant for.
 
     A pose is inside when its position minus home's is within `translation` and the
     Euler angles of home's inverse rotation times its own, Rx Ry Rz, are within `rotation_deg`.
@@ -24,18 +23,17 @@ class Workspace:
     Attributes:
         translation: (3, 2) lowest and highest x, y, z from home [platform unit].
         rotation_deg: (3, 2) lowest and highest Euler angles from home [deg].
+
+    Raises:
+        PlatformError: naming the field, what was found and what was expected.
     """
 
     translation: Array
     rotation_deg: Array
 
-    if TYPE_CHECKING:
-
-        def __init__(self, translation: ArrayLike, rotation_deg: ArrayLike) -> None: ...
-
-    def __post_init__(self) -> None:
-        for name in ("translation", "rotation_deg"):
-            box = platform_field(f"workspace.{name}", getattr(self, name), (3, 2))
+    def __init__(self, translation: ArrayLike, rotation_deg: ArrayLike) -> None:
+        for name, given in (("translation", translation), ("rotation_deg", rotation_deg)):
+            box = platform_field(f"workspace.{name}", given, (3, 2))
             if np.any(box[:, 0] > box[:, 1]):
                 axis = int(np.argmax(box[:, 0] > box[:, 1]))
                 raise PlatformError(
@@ -51,7 +49,7 @@ class Workspace:
 
     @classmethod
     def about_home(cls, translation: ArrayLike, rotation_deg: ArrayLike) -> Workspace:
-        """From boxes (3, 2), or one number each: as far on every axis and to both sides."""
+        """Make a workspace from boxes (3, 2) or half widths [platform unit], [deg]."""
         boxes = [
             platform_numbers("workspace.translation", translation),
             platform_numbers("workspace.rotation_deg", rotation_deg),
@@ -59,15 +57,22 @@ class Workspace:
         return cls(*(np.tile([-b, b], (3, 1)) if b.ndim == 0 else b for b in boxes))
 
     def sample(self, home: Pose, count: int, seed: int) -> Pose:
-        """Poses drawn evenly from the box, batch (count,); the same seed, the same poses."""
+        """Draw poses evenly from the box, batch (count,); one seed always gives the same poses.
+
+        Raises:
+            GoughError: a count or a seed that is not a whole number of 0 or more.
+        """
+        for name, value in (("count", count), ("seed", seed)):
+            if not isinstance(value, (int, np.integer)) or value < 0:
+                raise GoughError(f"{name}: expected a whole number of 0 or more, found {value!r}")
         rng = np.random.default_rng(seed)
-        shift = rng.uniform(*self.translation.T, size=(count, 3))
+        translation = rng.uniform(*self.translation.T, size=(count, 3))
         angles = np.radians(rng.uniform(*self.rotation_deg.T, size=(count, 3)))
-        turn = Pose.from_euler(np.zeros(3), angles).wxyz
-        return Pose(home.position + shift, quaternion.product(home.wxyz, turn))
+        rotation = quaternion.from_euler(angles)
+        return Pose(home.position + translation, quaternion.product(home.wxyz, rotation))
 
     def contains(self, home: Pose, pose: Pose, length: float, angle: float) -> NDArray[np.bool_]:
-        """Whether poses (...) are in the box widened by `length` [unit] and `angle` [rad]."""
+        """Test poses (...) against the box widened by `length` [platform unit], `angle` [rad]."""
         conjugate = home.inverse().wxyz
         turn = Pose(pose.position - home.position, quaternion.product(conjugate, pose.wxyz))
         inside = np.ones(pose.batch, dtype=bool)
