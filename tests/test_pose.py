@@ -379,7 +379,7 @@ def test_matrices_that_are_no_poses_are_refused(change: Floats, message: str) ->
 
 
 def test_masked_entries_are_read_as_nan() -> None:
-    position = np.ma.masked_array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], [[0, 0, 0], [0, 1, 0]])
+    position = np.ma.masked_equal([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], 5.0)
     pose = Pose(position)
     assert np.isnan(pose.position[1, 1])
     assert np.isfinite(pose.position[0]).all()

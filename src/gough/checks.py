@@ -31,7 +31,7 @@ def frozen(array: Array) -> Array:
 
 def _to_float(name: str, value: ArrayLike) -> Array:
     if isinstance(value, np.ma.MaskedArray):
-        return _to_float(name, value.astype(np.float64).filled(np.nan))
+        return np.where(np.ma.getmaskarray(value), np.nan, _to_float(name, value.data))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return value
     try:
