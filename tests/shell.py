@@ -46,8 +46,8 @@ def _here(arguments: list[str], target: str | None) -> tuple[str, int]:
     out = io.StringIO()
     told = io.StringIO() if target else out
     with (
-        mock.patch.object(cli.stopping, "listen"),  # signals belong to the tests
-        mock.patch.object(cli.stopping, "ignore"),
+        mock.patch.object(cli.signals, "listen"),  # signals belong to the tests
+        mock.patch.object(cli.signals, "ignore"),
         mock.patch.dict(os.environ, {"COLUMNS": WIDTH}),
         contextlib.redirect_stdout(told),
         contextlib.redirect_stderr(out),

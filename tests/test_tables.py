@@ -415,7 +415,7 @@ def test_wrong_kinds_and_angles_are_named() -> None:
 def test_a_library_that_is_missing_is_named(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     found = gough.solve(PLATFORM, READINGS)
     monkeypatch.setitem(sys.modules, kind, None)
-    with pytest.raises(gough.GoughError, match=f"pip install {kind}, or ask for kind='pyarrow'"):
+    with pytest.raises(gough.GoughError, match=f"pip install {kind}, or pass kind='pyarrow'"):
         found.to_frame(kind)
 
 
@@ -432,7 +432,7 @@ def test_one_library_does_not_bring_another(library: str, other: str) -> None:
     make = {"polars": "polars.DataFrame", "pyarrow": "pyarrow.table"}[library]
     code = (  # pyarrow's own way from lists to arrays would import pandas
         f"import sys, numpy, gough, {library}\n"
-        "from gough.arrow import number_column\n"
+        "from gough.tables import number_column\n"
         "p = gough.Platform.load('reference')\n"
         "legs = {f'leg_{i + 1}': number_column(v[None]) for i, v in enumerate(p.home_legs)}\n"
         f"frame = gough.solve(p, {make}(legs)).to_frame()\n"

@@ -9,8 +9,7 @@ from contextlib import suppress
 from importlib import import_module
 
 import gough
-from gough.commands import COMMANDS
-from gough.commands import signals as stopping
+from gough.commands import COMMANDS, signals
 from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
@@ -26,9 +25,9 @@ def main(arguments: list[str] | None = None) -> None:
     or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 told to terminate.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    stopping.listen()
+    signals.listen()
     code = _guarded(given)
-    stopping.ignore()
+    signals.ignore()
     sys.exit(code)
 
 
@@ -41,7 +40,7 @@ def _guarded(arguments: list[str]) -> int:
         return code
     except GoughError as error:
         return _complain(f"{name}: error: {error}")
-    except stopping.Stopped as stop:
+    except signals.Stopped as stop:
         return _stopped(name, stop.number)
     except BrokenPipeError:
         _drop_output()
@@ -62,7 +61,7 @@ def _guarded(arguments: list[str]) -> int:
             f"pip install 'gough[{extra}]', or in a clone: pip install -e '.[{extra}]'"
         )
     except Exception:
-        number = stopping.asked()
+        number = signals.asked()
         if number is None:
             raise
         return _stopped(name, number)  # a library made another error of it

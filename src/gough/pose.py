@@ -377,9 +377,7 @@ def pose_values(pose: Pose, angles: Angles | None) -> Array:
 
 def pose_table(pose: Pose, angles: Angles | None) -> dict[str, pa.Array]:
     """Columns of poses by name, batch axes flattened."""
-    from gough.arrow import number_column
-
-    columns = map(number_column, pose_values(pose, angles).T)
+    columns = map(tables.number_column, pose_values(pose, angles).T)
     return dict(zip(pose_names(angles), columns, strict=True))
 
 

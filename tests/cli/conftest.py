@@ -25,7 +25,7 @@ class Result(NamedTuple):
 @pytest.fixture
 def gough(capsys: pytest.CaptureFixture[str], monkeypatch) -> Callable[..., Result]:
     """Run a command in this process, signals left alone."""
-    monkeypatch.setattr(cli.stopping, "listen", lambda: None)
+    monkeypatch.setattr(cli.signals, "listen", lambda: None)
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments: object) -> Result:

@@ -10,7 +10,7 @@ from gough import cli
 @pytest.fixture
 def gough_command(capsys, monkeypatch):
     """Run a command; (exit code, standard output, standard error)."""
-    monkeypatch.setattr(cli.stopping, "listen", lambda: None)
+    monkeypatch.setattr(cli.signals, "listen", lambda: None)
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments: object) -> tuple[int, str, str]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 pytest.importorskip("matplotlib")
 
 import gough
-from gough.files.source import Reading
+from gough.files import Reading
 from gough.plot import LogHistogram, histogram_figure
 from gough.plot.histograms import PER_DECADE
 from gough.plot.rows import read_errors

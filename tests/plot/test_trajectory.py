@@ -16,7 +16,7 @@ pytest.importorskip("matplotlib")
 
 import gough
 from gough.columns import LEGS
-from gough.files.source import Reading
+from gough.files import Reading
 from gough.plot import Envelope, trajectory_figure
 from gough.plot.rows import read_pose, read_trajectory
 from gough.plot.trajectory import SIGNALS, note, signals

@@ -21,7 +21,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "rubin_camera_legs.csv"
 @pytest.fixture
 def view(capsys: pytest.CaptureFixture[str], monkeypatch):
     """Run `gough view` in this process; exit code, output, errors."""
-    monkeypatch.setattr(cli.stopping, "listen", lambda: None)
+    monkeypatch.setattr(cli.signals, "listen", lambda: None)
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments: object) -> tuple[int, str, str]:

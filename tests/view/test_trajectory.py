@@ -36,14 +36,15 @@ def write(path: Path, head: str, rows) -> Path:
 def test_rows_are_kept_evenly_over_any_stream(blocks: list[int], most: int):
     thin = Thin(most)
     total = 0
-    thin.add(np.empty((0, 1)))
+    thin.add(np.empty((0, 2)))
     for size in blocks:
-        thin.add(np.arange(total, total + size, dtype=float)[:, None])
+        numbers = np.arange(total, total + size, dtype=float)
+        thin.add(np.stack([numbers + 1, numbers], axis=-1))
         total += size
-    number, values, seen = thin.rows
-    assert seen == total
+    number, values = thin.rows.T
+    assert thin.total == total
     assert len(number) <= most
-    assert np.array_equal(number, values[:, 0] + 1)  # a row keeps its number
+    assert np.array_equal(number, values + 1)  # a row keeps its number
     if total:
         step = number[1] - number[0] if len(number) > 1 else total
         assert np.array_equal(number, np.arange(1, total + 1, step))
@@ -90,6 +91,15 @@ def test_a_row_without_a_pose_says_why(tmp_path):
     assert "cannot reach" in trajectory.answers[1].text
     assert trajectory.failures == 1
     assert trajectory.about.endswith("; 1 of the shown rows have no pose.")
+
+
+def test_a_row_that_the_file_states_as_unusable_is_not_shown(platform, tmp_path):
+    path = tmp_path / "poses.csv"
+    rows = ["0,0,0,0,0,0,converged", "0,0,0,0,0,0,not_converged", "0,0,0,0,0,0,"]
+    path.write_text("\n".join(["x,y,z,rx,ry,rz,status", *rows]))
+    answers = read(path, platform, rows=10).answers
+    assert [a.reached for a in answers] == [True, False, True]
+    assert answers[1].text == Status.NOT_CONVERGED.text
 
 
 def test_times_play_as_fast_as_it_was(platform, tmp_path):

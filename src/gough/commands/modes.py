@@ -79,7 +79,7 @@ def readings(legs: tuple[str, ...], platform: Platform) -> Array:
     if not legs:
         return platform.home_legs
     if len(legs) == 1 and (legs[0] == "-" or legs[0].lower().endswith((".csv", ".parquet"))):
-        from gough.files.whole import read_legs
+        from gough.files import read_legs
 
         return read_legs(legs[0], platform)
     return six_numbers("LEGS", legs, "readings or a .csv or .parquet file")
@@ -177,9 +177,9 @@ def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
     """One row for each pose, the best of its set of readings first."""
     import numpy as np
 
-    from gough.arrow import number_column
-    from gough.files.whole import write_table
+    from gough.files import write_table
     from gough.modes.result import mode_columns
+    from gough.tables import number_column
 
     columns = mode_columns(modes, None)
     columns = {"row": columns.pop("row"), "pose": number_column(choice.rank + 1)} | columns

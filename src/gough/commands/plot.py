@@ -295,9 +295,9 @@ def _save(figure: Figure, machine: Platform, out: str | None, name: str) -> int:
 @contextmanager
 def _ticking():
     """What to call after every block: it ends the command if a signal has asked for it."""
-    from gough.commands import signals as stopping
+    from gough.commands import signals
 
-    yield lambda source: stopping.check()
+    yield lambda source: signals.check()
 
 
 def _name(file: str) -> str:

@@ -12,12 +12,12 @@ from rich.box import Box
 from rich.console import Console
 from rich.table import Table
 
-from gough.commands import signals as stopping
+from gough.commands import signals
 
 if TYPE_CHECKING:
     from gough.files.convert import Progress as Tick
     from gough.files.report import Report
-    from gough.files.source import Source
+    from gough.files.rows import Source
     from gough.platform import Platform
 
 NOTICED = 2.0  # [s] of compiling that deserve a word
@@ -129,7 +129,7 @@ def progress_bar() -> Iterator[Tick]:
     ends the command if a signal has asked for it.
     """
     if not sys.stderr.isatty():
-        yield lambda source, report: stopping.check()
+        yield lambda source, report: signals.check()
         return
     from rich.progress import (
         BarColumn,
@@ -146,6 +146,6 @@ def progress_bar() -> Iterator[Tick]:
         def update(source: Source, report: Report) -> None:
             rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"
             bar.update(task, completed=source.done, total=source.total, rate=rate)
-            stopping.check()
+            signals.check()
 
         yield update

@@ -3,13 +3,22 @@
     report = solve_file("legs.parquet", "poses.parquet", platform)
     report = inverse_file("poses.csv", "legs.csv", platform)
 
-A file name ending in .csv or .parquet picks the format; "-" is CSV on standard input or output.
+A file name ending in .csv or .parquet gives the format; "-" is CSV on standard input or output.
 """
 
 from __future__ import annotations
 
 from gough.files.convert import inverse_file, solve_file
+from gough.files.formats import open_source, read_legs, write_table
 from gough.files.report import Report
-from gough.files.source import Reading, open_source
+from gough.files.rows import Reading
 
-__all__ = ["Reading", "Report", "inverse_file", "open_source", "solve_file"]
+__all__ = [
+    "Reading",
+    "Report",
+    "inverse_file",
+    "open_source",
+    "read_legs",
+    "solve_file",
+    "write_table",
+]

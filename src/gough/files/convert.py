@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
-from gough.arrow import label_column, number_column
 from gough.checks import Array
 from gough.columns import (
     LEGS,
@@ -23,21 +23,19 @@ from gough.columns import (
     solution_names,
 )
 from gough.errors import GoughError
-from gough.files.block import Block
+from gough.files.formats import STANDARD, file_format, open_sink, open_source
 from gough.files.metadata import check_same, describe
 from gough.files.placing import INVALID, PLACED, placed
-from gough.files.report import NAMED, Report
-from gough.files.sink import Sink, open_sink
-from gough.files.source import STANDARD, Reading, Source, file_format, open_source
+from gough.files.report import Report
+from gough.files.rows import Block, Reading, Sink, Source
 from gough.fk.solution import solution_columns
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
 from gough.pose import poses_from_columns
-from gough.status import Outcome, Status
+from gough.status import Status
+from gough.tables import label_column, number_column
 
 Progress = Callable[[Source, Report], None]
-
-SOLVED = tuple(Status)
 
 
 def solve_file(
@@ -50,47 +48,50 @@ def solve_file(
     leg_noise: float | None = None,
     head: int = 0,
     progress: Progress | None = None,
-    **solver: object,
+    **options: object,
 ) -> Report:
-    """Poses of a file of leg readings, row for row.
+    """Solve a file of leg readings, row for row.
 
     Args:
-        legs: .csv or .parquet with columns leg_1 to leg_6, or "-".
+        legs: .csv or .parquet with columns leg_1 to leg_6, or "-" for standard input.
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones, the
             pose, status, residual [platform unit], iterations; with `leg_noise` std_x, std_y,
             std_z [platform unit], std_rx, std_ry, std_rz [rad]; with `certify` the radius of
             uniqueness [platform unit].
-        angles: write Euler angles (Rx Ry Rz) in these units in place of quaternions.
+        platform: the machine.
+        reading: options for reading the file.
+        angles: write Euler angles (R = Rx Ry Rz) in these units instead of quaternions.
         leg_noise: standard deviation of the readings, in their unit.
-        head: how many first rows the report is to hold.
-        progress: called after every block, with how far the file is read and the counts.
-        solver: passed on to `gough.solve`: seed, tol, max_iterations and the like.
+        head: number of first rows that the report holds.
+        progress: called after every block with the file and the counts so far.
+        options: of `gough.solve`: seed, tol, max_iterations and others.
 
     Raises:
-        GoughError: what is wrong, where and what to do; `out` is then as it was.
+        GoughError: what is wrong, where, and what to do; an old file at `out` is unchanged.
+
+    Example:
+        >>> report = solve_file("legs.csv", "poses.parquet", platform, angles="deg")
+        >>> report.rows, report.failures
+        (1000, 0)
     """
     from gough.fk.solve import solve
 
-    def step(block: Block) -> dict[str, pa.Array]:
-        readings = block.numbers(LEGS)
-        if report.rows == 0:
-            solve(platform, platform.home_legs, **solver)  # pyright: ignore[reportArgumentType]
-            report.start()
-        solution = solve(platform, readings, leg_noise=leg_noise, **solver)  # pyright: ignore[reportArgumentType]
-        status = solution.status
-        report.add(solution.pose, readings, status, solution.residual)
-        _name(
-            report,
-            block,
-            status == Status.INVALID_INPUT,
-            lambda i: _bad_legs(readings[i]),
-        )
-        return solution_columns(solution, angles)
-
-    report = Report(SOLVED, head)
-    written = solution_names(angles, leg_noise is not None, bool(solver.get("certify")))
-    tick = _tick(report, progress)
-    _run(legs, out, platform, reading, leg_columns, written, step, tick)
+    solver = partial(solve, platform, leg_noise=leg_noise, **options)  # pyright: ignore[reportArgumentType]
+    report = Report(tuple(Status), head)
+    written = solution_names(angles, leg_noise is not None, bool(options.get("certify")))
+    with _open_job(legs, out, platform, reading, leg_columns, written) as job:
+        for block in job.blocks:
+            if report.rows == 0:
+                solver(platform.home_legs)  # compiles
+                report.start()
+            readings = block.numbers(LEGS)
+            solution = solver(readings)
+            report.add(solution.pose, readings, solution.status, solution.residual)
+            invalid = solution.status == Status.INVALID_INPUT
+            report.describe_invalid(block, invalid, lambda i, legs=readings: _leg_fault(legs[i]))
+            job.write(block, solution_columns(solution, angles))
+            if progress:
+                progress(job.source, report)
     return report
 
 
@@ -103,47 +104,72 @@ def inverse_file(
     head: int = 0,
     progress: Progress | None = None,
 ) -> Report:
-    """Leg readings of a file of poses, row for row.
+    """Calculate the leg readings of a file of poses, row for row.
 
     Args:
         poses: .csv or .parquet with columns x, y, z and qw, qx, qy, qz, or rx, ry, rz [rad], or
-            rx_deg, ry_deg, rz_deg (R = Rx Ry Rz), or "-".
+            rx_deg, ry_deg, rz_deg (R = Rx Ry Rz), or "-" for standard input.
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones,
             leg_1 to leg_6 and status.
+        platform, reading, head, progress: as for `solve_file`.
 
     Raises:
-        GoughError: what is wrong, where and what to do; `out` is then as it was.
+        GoughError: what is wrong, where, and what to do; an old file at `out` is unchanged.
     """
-
-    def step(block: Block) -> dict[str, pa.Array]:
-        names = pose_columns("", block.table.column_names)
-        values = block.numbers(names)
-        pose, reasons = poses_from_columns(values, names)
-        with np.errstate(invalid="ignore"):
-            readings = leg_lengths(platform, pose)
-        status = placed(platform, pose, readings)
-        report.add(pose, readings, status)
-        _name(report, block, status == INVALID, reasons)
-        columns = {name: number_column(readings[:, i]) for i, name in enumerate(LEGS)}
-        return columns | {STATUS: _labels(PLACED, status)}
-
     report = Report(PLACED, head)
-    tick = _tick(report, progress)
-    _run(poses, out, platform, reading, pose_columns, [*LEGS, STATUS], step, tick)
+    labels = [outcome.label for outcome in PLACED]
+    with _open_job(poses, out, platform, reading, pose_columns, (*LEGS, STATUS)) as job:
+        for block in job.blocks:
+            pose, fault = poses_from_columns(block.numbers(job.numbers), job.numbers)
+            with np.errstate(invalid="ignore"):
+                legs = leg_lengths(platform, pose)
+            status = placed(platform, pose, legs)
+            report.add(pose, legs, status)
+            report.describe_invalid(block, status == INVALID, fault)
+            columns = dict(zip(LEGS, map(number_column, legs.T), strict=True))
+            job.write(block, columns | {STATUS: label_column(status, labels)})
+            if progress:
+                progress(job.source, report)
     return report
 
 
-def _run(
+@dataclass(frozen=True)
+class _Job:
+    """A file being read, and one being written if there is one.
+
+    Attributes:
+        numbers: names of the columns to convert.
+        keep: names of the columns to copy.
+    """
+
+    source: Source
+    blocks: Iterator[Block]
+    numbers: tuple[str, ...]
+    keep: tuple[str, ...]
+    sink: Sink | None
+
+    def write(self, block: Block, results: dict[str, pa.Array]) -> None:
+        """Write results beside the kept columns of their block."""
+        if self.sink is not None:
+            kept = {name: block.table.column(name) for name in self.keep}
+            self.sink.write(pa.table(kept | results))
+
+
+@contextmanager
+def _open_job(
     path: str | Path,
     out: str | Path | None,
     platform: Platform,
     reading: Reading,
     pick: Callable[[str, Sequence[str]], tuple[str, ...]],
     written: Sequence[str],
-    step: Callable[[Block], dict[str, pa.Array]],
-    tick: Callable[[Source], None],
-) -> None:
-    """Read blocks, `step` each, write what it returns beside the kept columns."""
+) -> Iterator[_Job]:
+    """Open both files, after all checks that need no rows.
+
+    Args:
+        pick: chooses the columns to convert, as `leg_columns` does.
+        written: names of the columns that results are written to.
+    """
     _check_paths(path, out)
     check_kept(reading.keep, written)
     with ExitStack() as stack:
@@ -153,71 +179,34 @@ def _run(
         if not reading.ignore_platform:
             check_same(source.where, source.metadata, platform)
         sink = stack.enter_context(open_sink(out, describe(platform))) if out else None
-        typed = out is not None and file_format(out) == ".parquet"
         blocks = source.blocks(
             numbers,
             keep,
             rows=reading.block_rows,
             keep_bad=reading.keep_bad_rows,
-            typed=typed,
+            typed=out is not None and file_format(out) == ".parquet",
         )
-        _pump(source, blocks, keep, step, sink, tick)
-
-
-def _pump(
-    source: Source,
-    blocks: Iterator[Block],
-    keep: Sequence[str],
-    step: Callable[[Block], dict[str, pa.Array]],
-    sink: Sink | None,
-    tick: Callable[[Source], None],
-) -> None:
-    for block in blocks:
-        results = step(block)
-        if sink is not None:
-            kept = {name: block.table.column(name) for name in keep}
-            sink.write(pa.table(kept | results))
-        tick(source)
-
-
-def _tick(report: Report, progress: Progress | None) -> Callable[[Source], None]:
-    return lambda source: progress(source, report) if progress else None
+        yield _Job(source, blocks, numbers, keep, sink)
 
 
 def _check_paths(path: str | Path, out: str | Path | None) -> None:
-    """That both names are of a known format, and that the readings are not to be replaced."""
+    """Raise for a name of no known format, and for an output that is the input."""
     file_format(path)
     if out is None:
         return
     file_format(out)
-    if str(out) != STANDARD and str(path) != STANDARD:
-        same = Path(out).exists() and Path(path).exists() and Path(out).samefile(path)
-        if same:
-            raise GoughError(
-                f"{out}: is the input itself, which would be lost; write to another name"
-            )
+    paths = [Path(path), Path(out)]
+    if STANDARD in map(str, paths) or not all(p.exists() for p in paths):
+        return
+    if paths[0].samefile(paths[1]):
+        raise GoughError(f"{out}: is the input itself, which would be lost; write to another name")
 
 
-def _labels(outcomes: Sequence[Outcome], status: NDArray[np.uint8]) -> pa.Array:
-    return label_column(status, [outcome.label for outcome in outcomes])
-
-
-def _name(
-    report: Report,
-    block: Block,
-    invalid: NDArray[np.bool_],
-    reason: Callable[[int], str],
-) -> None:
-    """Describe invalid rows, as long as the report has room."""
-    for i in np.flatnonzero(invalid)[: NAMED - len(report.invalid)]:
-        row = int(i)
-        report.invalid.append(f"{block.place(row)}: {block.bad.get(row) or reason(row)}")
-
-
-def _bad_legs(readings: Array) -> str:
-    for name, value in zip(LEGS, readings, strict=True):
+def _leg_fault(legs: Array) -> str:
+    """The fault of six readings that cannot be solved."""
+    for name, value in zip(LEGS, legs, strict=True):
         if not np.isfinite(value):
             found = "empty or not a number" if np.isnan(value) else value
             return f"{name} is {found}, expected a finite number"
-    low = int(np.argmin(readings))
-    return f"{LEGS[low]} is {readings[low]:.9g}, which makes no leg longer than 0"
+    low = int(np.argmin(legs))
+    return f"{LEGS[low]} is {legs[low]:.9g}, which makes no leg longer than 0"

@@ -1,4 +1,4 @@
-"""Which platform a Parquet file belongs to, in its metadata."""
+"""The platform that a Parquet file belongs to, in the file's metadata."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gough.platform import Platform
 
 
 def geometry_digest(platform: Platform) -> str:
-    """SHA-256 over what ties readings to poses: joints, unit, kind of leg, pivot, motor arms.
+    """SHA-256 of what relates readings to poses: joints, unit, kind of leg, pivot, motor arms.
 
-    `Platform.digest` also covers stroke and workspace, and home; a file of readings stays
-    valid when those are edited, except that home is the zero of length changes.
+    `Platform.digest` also covers stroke, workspace and home. A file of readings stays valid when
+    those are edited, except that home is the zero of length changes.
     """
     facts = platform.to_dict()
     for key in ("name", "stroke", "workspace"):
@@ -37,7 +37,7 @@ def describe(platform: Platform) -> dict[str, str]:
 
 
 def check_same(where: str, metadata: Mapping[str, str], platform: Platform) -> None:
-    """That a file which names its platform names this one; files that name none pass.
+    """Raise if a file was written for another platform; a file that names none passes.
 
     Raises:
         InputError: another unit or another geometry.

@@ -1,18 +1,20 @@
-"""What became of the rows of a file."""
+"""Counts of the rows of a file by status, and the first rows."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.files.rows import Block
 from gough.pose import Pose
 from gough.status import Outcome
 
-NAMED = 5  # invalid rows that are described one by one
+DESCRIBED = 5  # invalid rows that are described one by one
 
 
 @dataclass
@@ -20,13 +22,14 @@ class Report:
     """Counts over a whole file, and its first rows.
 
     Attributes:
-        outcomes: the ends a row can come to; status numbers are indices here.
-        counts: how many rows came to each.
-        worst: the largest residual in each [platform unit].
-        invalid: the first few invalid rows: where, and what is wrong.
-        pose, legs, status: the first rows themselves, as many as were asked for.
+        outcomes: the statuses; those of rows are indices here.
+        head: how many of the first rows to hold.
+        counts: rows of each status.
+        worst: largest residual of each status [platform unit], NaN where there is none.
+        invalid: place and fault of each of the first few invalid rows.
+        pose, legs, status: the first rows, at most `head`.
         seconds: time taken by the rows.
-        preparing: time taken before them, to compile the solver and to fit its seed.
+        preparing: time before them, to compile the solver and to fit its seed.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -46,41 +49,48 @@ class Report:
         self._start = time.perf_counter()
 
     def start(self) -> None:
-        """Begin to count the rows' time; what went before is `preparing`."""
+        """Begin to count the rows' time; the time before is `preparing`."""
         self.preparing = time.perf_counter() - self._start
         self._start = time.perf_counter()
 
     @property
     def rows(self) -> int:
-        """Rows in all."""
+        """Number of rows."""
         return int(self.counts.sum())
 
     @property
     def failures(self) -> int:
-        """Rows whose answer cannot be used."""
+        """Number of rows whose result cannot be used."""
         return sum(int(n) for n, o in zip(self.counts, self.outcomes, strict=True) if not o.usable)
 
     def add(
-        self,
-        pose: Pose,
-        legs: Array,
-        status: NDArray[np.uint8],
-        residual: Array | None = None,
+        self, pose: Pose, legs: Array, status: NDArray[np.uint8], residual: Array | None = None
     ) -> None:
         """Count a block of rows."""
-        self.counts += np.bincount(status, minlength=len(self.outcomes))
+        counts = np.bincount(status, minlength=len(self.outcomes))
+        self.counts += counts
         if residual is not None:
-            for number in np.unique(status):
-                found = np.append(residual[status == number], self.worst[number])
-                found = found[~np.isnan(found)]
-                self.worst[number] = found.max() if len(found) else np.nan
-        room = self.head - len(self.status)
-        if room > 0:
-            part = slice(0, room)
-            self.pose = Pose(
-                np.concatenate([self.pose.position, pose.position[part]]),
-                np.concatenate([self.pose.wxyz, pose.wxyz[part]]),
-            )
-            self.legs = np.concatenate([self.legs, legs[part]])
-            self.status = np.concatenate([self.status, status[part]])
+            for number in np.flatnonzero(counts):
+                found = np.fmax.reduce(residual[status == number])
+                self.worst[number] = np.fmax(self.worst[number], found)
+        part = slice(0, max(self.head - len(self.status), 0))
+        self.pose = Pose.trusted(
+            np.concatenate([self.pose.position, pose.position[part]]),
+            np.concatenate([self.pose.wxyz, pose.wxyz[part]]),
+        )
+        self.legs = np.concatenate([self.legs, legs[part]])
+        self.status = np.concatenate([self.status, status[part]])
         self.seconds = time.perf_counter() - self._start
+
+    def describe_invalid(
+        self, block: Block, rows: NDArray[np.bool_], fault: Callable[[int], str]
+    ) -> None:
+        """Describe the first few invalid rows of the file.
+
+        Args:
+            block: the rows' block.
+            rows: (N,), True for its invalid rows.
+            fault: gives the fault of a row that could be read.
+        """
+        for row in map(int, np.flatnonzero(rows)[: DESCRIBED - len(self.invalid)]):
+            self.invalid.append(f"{block.place(row)}: {block.bad.get(row) or fault(row)}")

@@ -12,7 +12,7 @@ from gough.checks import Array
 from gough.columns import Angles, pose_names, solution_names
 from gough.pose import Pose, pose_cells, pose_values
 from gough.status import USABLE, Status
-from gough.tables import Kind, Origin, Table, make_frame
+from gough.tables import Kind, Table, TableInfo, label_column, make_frame, number_column
 from gough.text import length_head, number, page, pose_heads, rows_of
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Solution:
         radius: (...) radius of uniqueness [platform unit], see `gough.Certificate`, 0 where
             nothing is proven; None unless certificates were asked for.
         unit: name of the platform's length unit, a label.
-        origin: the table that the readings came in, if they did; see `to_frame`.
+        table: library and row labels of the table of readings, if they came in one.
     """
 
     pose: Pose
@@ -45,7 +45,7 @@ class Solution:
     covariance: Array | None = None
     radius: Array | None = None
     unit: str = ""
-    origin: Origin | None = None
+    table: TableInfo | None = None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -64,7 +64,7 @@ class Solution:
         radius = None if self.radius is None else self.radius[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
-            covariance, radius, self.unit, self.origin and self.origin.at(index),
+            covariance, radius, self.unit, self.table and self.table.at(index),
         )  # fmt: skip
 
     def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
@@ -83,7 +83,7 @@ class Solution:
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
         """
-        return make_frame(solution_columns(self, angles), kind, self.origin)
+        return make_frame(solution_columns(self, angles), kind, self.table)
 
     def __repr__(self) -> str:
         if not self.pose.batch:
@@ -122,8 +122,6 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
     Raises:
         GoughError: angles of another name.
     """
-    from gough.arrow import label_column, number_column
-
     with_covariance, with_radius = solution.covariance is not None, solution.radius is not None
     numbers = list(pose_values(solution.pose, angles).T)
     numbers += [np.ravel(solution.residual), np.ravel(solution.iterations)]

@@ -16,7 +16,7 @@ from gough.pose import Pose
 from gough.seeds.base import PolynomialSeed, PoseSeed, Seed, find_seed
 from gough.seeds.polynomial import Polynomial
 from gough.status import USABLE, Status
-from gough.tables import Origin, Table, as_readings, origin
+from gough.tables import Table, TableInfo, as_readings, table_info
 
 
 def solve(
@@ -83,7 +83,7 @@ def solve(
     radius = _certify(platform, flat, rows, settings) if certify else None
     if ambiguous:
         _doubt(platform, flat, rows)
-    return _solution(platform, rows, radius, readings.shape[:-1], leg_noise, origin(legs))
+    return _solution(platform, rows, radius, readings.shape[:-1], leg_noise, table_info(legs))
 
 
 def _start(platform: Platform, seed: Seed, legs: Array) -> Array | Polynomial:
@@ -162,7 +162,7 @@ def _solution(
     radius: Array | None,
     batch: tuple[int, ...],
     leg_noise: ArrayLike | None,
-    source: Origin | None,
+    source: TableInfo | None,
 ) -> Solution:
     pose = Pose.trusted(rows.position.reshape(*batch, 3), rows.wxyz.reshape(*batch, 4))
     return Solution(

@@ -22,7 +22,7 @@ from gough.modes.starts import SEED, Start, start_of
 from gough.modes.study import distinct
 from gough.platform import Platform
 from gough.status import ModesStatus
-from gough.tables import Origin, Table, as_readings, origin
+from gough.tables import Table, TableInfo, as_readings, table_info
 
 CHUNK = 128  # sets of readings per task
 # What readings whose paths do not all arrive apart are tried with: the share of the radius of
@@ -62,7 +62,7 @@ def assembly_modes(
         _curves(platform, work, todo, outcome)
     else:
         _run(work, todo, outcome, threads)
-    return _assemble(platform, readings, start, outcome, origin(legs))
+    return _assemble(platform, readings, start, outcome, table_info(legs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +246,7 @@ def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _
 
 
 def _assemble(
-    platform: Platform, legs: Array, start: Start, outcome: _Outcome, source: Origin | None
+    platform: Platform, legs: Array, start: Start, outcome: _Outcome, source: TableInfo | None
 ) -> AssemblyModes:
     """Poses in the platform's coordinates, certified, nearest to home first in each row."""
     row, e, t, multiple = (np.concatenate(parts) for parts in zip(*outcome.blocks, strict=True))
@@ -261,7 +261,7 @@ def _assemble(
         platform=platform, legs=legs, pose=pose, row=row, multiplicity=multiple,
         certificate=proof, status=outcome.status.reshape(legs.shape[:-1]),
         paths=outcome.paths.reshape(*legs.shape[:-1], 4), solutions=start.count,
-        origin=source,
+        table=source,
     )  # fmt: skip
 
 

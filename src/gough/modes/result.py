@@ -17,7 +17,7 @@ from gough.kinematics import assembly_sign, equivalent_struts, joint_positions, 
 from gough.platform import Platform
 from gough.pose import Pose, pose_cells, pose_table
 from gough.status import ModesStatus
-from gough.tables import Kind, Origin, Table, make_frame
+from gough.tables import Kind, Table, TableInfo, label_column, make_frame, number_column
 from gough.text import length_head, number, page, pose_heads, rows_of
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class AssemblyModes:
         paths: (4,) or (N, 4): how many of the complex solutions are real, are complex, went
             to infinity, met in singular ones.
         solutions: complex solutions that this machine has for general readings.
-        origin: the table that the readings came in, if they did; see `to_frame`.
+        table: library and row labels of the table of readings, if they came in one.
     """
 
     platform: Platform
@@ -56,7 +56,7 @@ class AssemblyModes:
     status: NDArray[np.uint8]
     paths: NDArray[np.int32]
     solutions: int
-    origin: Origin | None = None
+    table: TableInfo | None = None
 
     @cached_property
     def residual(self) -> Array:
@@ -111,7 +111,7 @@ class AssemblyModes:
             multiplicity=self.multiplicity[mine], status=self.status[index],
             certificate=proof[mine],
             paths=self.paths[index],
-            origin=self.origin and self.origin.at(np.full(mine.sum(), index)),
+            table=self.table and self.table.at(np.full(mine.sum(), index)),
         )  # fmt: skip
 
     def __iter__(self) -> Iterator[AssemblyModes]:
@@ -134,7 +134,7 @@ class AssemblyModes:
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
         """
-        source = self.origin
+        source = self.table
         if source is not None and self.legs.ndim > 1:
             source = source.at(self.row)
         return make_frame(mode_columns(self, angles), kind, source)
@@ -168,8 +168,6 @@ class AssemblyModes:
 
 def mode_columns(modes: AssemblyModes, angles: Angles | None) -> dict[str, pa.Array]:
     """The columns of `AssemblyModes.to_frame`."""
-    from gough.arrow import label_column, number_column
-
     labels = [status.label for status in ModesStatus]
     proof = modes.certificate
     return {

@@ -16,7 +16,7 @@ from gough.checks import Array
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.status import Status
+from gough.status import Outcome, Status
 
 LONGEST = 0.1  # a step moves the plate by at most so much of the platform's size
 WIDEST = 0.25  # [rad] and turns it by at most so much
@@ -69,9 +69,12 @@ def follow(platform: Platform, pose: Pose, legs: Array, target: Array) -> Arriva
     return Arrival(pose, text, residual, iterations, time.perf_counter() - begin)
 
 
-def has_pose(status: Status) -> bool:
-    """Whether a row of this status holds a pose that has the readings."""
-    return status not in (Status.UNREACHABLE, Status.NOT_CONVERGED, Status.INVALID_INPUT)
+NO_POSE = ("unreachable", "not_converged", "invalid_input")
+
+
+def has_pose(status: Outcome) -> bool:
+    """Return True if a row of this status holds a pose that has the readings."""
+    return status.label not in NO_POSE
 
 
 def _is_next(platform: Platform, old: Pose, new: Pose, status: Status) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,14 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.columns import LEGS, checked, pose_or_leg_columns
 from gough.errors import GoughError, InputError
-from gough.files.metadata import check_same
-from gough.files.placing import PLACED, placed
-from gough.files.source import Reading, Source, open_source
-from gough.kinematics import leg_lengths
+from gough.files import trajectory as files
+from gough.files.rows import Reading
 from gough.platform import Platform
-from gough.pose import Pose, poses_from_columns
+from gough.pose import Pose
 from gough.view.follow import has_pose
 from gough.view.model import Answer
 
@@ -41,7 +36,7 @@ class Trajectory:
 
     name: str
     of: str
-    number: Array
+    number: NDArray[np.int64]
     total: int
     time: Array
     timed: bool
@@ -79,34 +74,31 @@ class Trajectory:
 
 
 class Thin:
-    """Keeps at most `most` rows of a stream of unknown length, evenly spread over it."""
+    """At most `most` rows of a stream of unknown length, evenly spread over it.
+
+    Attributes:
+        total: rows of the stream.
+    """
 
     def __init__(self, most: int) -> None:
-        self._most, self._step, self._seen = most, 1, 0
-        self._kept: list[NDArray[np.floating]] = []
-        self._held = 0
+        self._most, self._step, self.total = most, 1, 0
+        self._kept: list[Array] = []
 
-    def add(self, values: Array) -> None:
-        """Rows (n, K) of the stream."""
-        number = self._seen + np.arange(len(values))
-        rows = np.column_stack([number + 1.0, values])
-        self._seen += len(values)
-        self._hold(rows[number % self._step == 0])
-
-    def _hold(self, rows: NDArray[np.floating]) -> None:
-        self._kept.append(rows)
-        self._held += len(rows)
-        while self._held > self._most:
+    def add(self, rows: Array) -> None:
+        """The next rows (n, K) of the stream; the first column numbers them, from 1."""
+        self.total += len(rows)
+        self._kept.append(self._chosen(rows))
+        while sum(map(len, self._kept)) > self._most:
             self._step *= 2
-            every = np.concatenate(self._kept)
-            self._kept = [every[(every[:, 0] - 1) % self._step == 0]]
-            self._held = len(self._kept[0])
+            self._kept = [self._chosen(np.concatenate(self._kept))]
+
+    def _chosen(self, rows: Array) -> Array:
+        return rows[(rows[:, 0] - 1) % self._step == 0]
 
     @property
-    def rows(self) -> tuple[Array, Array, int]:
-        """Numbers (N,) from 1, values (N, K), and how many rows there were in all."""
-        every = np.concatenate(self._kept, dtype=np.float64)
-        return every[:, 0], every[:, 1:], self._seen
+    def rows(self) -> Array:
+        """The rows kept, (N, K)."""
+        return np.concatenate(self._kept)
 
 
 def read(
@@ -117,85 +109,52 @@ def read(
     time: str | None = None,
     reading: Reading = Reading(),  # noqa: B008 - frozen
 ) -> Trajectory:
-    """A file of poses or of leg readings; of one that holds both, the poses.
+    """Read a file of poses or of leg readings; of one that holds both, the poses.
 
     Args:
-        rows: at most so many are kept, evenly spread.
+        path: .csv or .parquet, or "-" for standard input.
+        platform: the machine.
+        rows: largest number of rows kept, evenly spread over the file.
         time: a column of rising times [s].
+        reading: options for reading the file.
 
     Raises:
         GoughError: what is wrong with the file, where, and what to do.
     """
     if rows < 2:
         raise GoughError(f"--rows {rows}: expected 2 or more")
-    with closing(open_source(path)) as source:
-        names = pose_or_leg_columns(source.where, source.columns)
-        wanted = (
-            names if time is None else (*names, *checked(source.where, source.columns, (time,)))
-        )
-        if not reading.ignore_platform:
-            check_same(source.where, source.metadata, platform)
-        number, values, total = _thinned(source, wanted, rows, reading)
-    clock = (number - number[0]) / ROWS_A_SECOND
+    thin = Thin(rows)
+    with files.open_trajectory(path, platform, time=time, reading=reading) as file:
+        for block in file.blocks():
+            thin.add(block)
+    found = file.solve(thin.rows)
+    clock = (found.number - found.number[0]) / ROWS_A_SECOND
     if time is not None:
-        clock = _times(str(path), time, number, values[:, -1])
-        values = values[:, :-1]
-    solved = _from_legs(platform, values) if names == LEGS else _placed(platform, values, names)
-    of = "leg readings" if names == LEGS else "poses"
-    return Trajectory(Path(path).name, of, number, total, clock, time is not None, *solved)
+        clock = _times(str(path), time, found)
+    of, how = ("poses", "inverse") if file.has_poses else ("leg readings", "forward")
+    answers = [
+        Answer(has_pose(outcome), outcome.text, f"{how} kinematics", float(residual), int(steps))
+        for outcome, residual, steps in zip(
+            found.outcomes, found.residual, found.iterations, strict=True
+        )
+    ]
+    return Trajectory(
+        Path(path).name, of, found.number, thin.total, clock, time is not None, found.pose,
+        found.legs, answers,
+    )  # fmt: skip
 
 
-def _thinned(
-    source: Source, names: tuple[str, ...], most: int, reading: Reading
-) -> tuple[Array, Array, int]:
-    thin = Thin(most)
-    for block in _blocks(source, names, reading):
-        thin.add(block)
-    return thin.rows
-
-
-def _blocks(source: Source, names: tuple[str, ...], reading: Reading) -> Iterator[Array]:
-    wanted = tuple(dict.fromkeys(names))  # a column may be asked for twice
-    blocks = source.blocks(wanted, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
-    for block in blocks:
-        yield block.numbers(names)
-
-
-def _times(where: str, name: str, number: Array, times: Array) -> Array:
-    """Times from the first one on.
+def _times(where: str, name: str, rows: files.Trajectory) -> Array:
+    """Times since the first.
 
     Raises:
-        InputError: naming the first row that has none, or an earlier one than its predecessor.
+        InputError: naming the first row that has no time, or an earlier one than its predecessor.
     """
+    times = rows.time
     rises = np.concatenate([[True], np.diff(times) >= 0]) & np.isfinite(times)
     if not rises.all():
         bad = int(np.argmin(rises))
         raise InputError(
-            f"{where}: row {number[bad]:.0f}: {name} is {times[bad]:.9g}; expected times that rise"
+            f"{where}: row {rows.number[bad]}: {name} is {times[bad]:.9g}; expected times that rise"
         )
     return times - times[0]
-
-
-def _from_legs(platform: Platform, legs: Array) -> tuple[Pose, Array, list[Answer]]:
-    from gough.fk.solve import solve
-    from gough.status import Status
-
-    found = solve(platform, legs)
-    answers = [
-        Answer(has_pose(status), status.text, "forward kinematics", float(residual), int(steps))
-        for status, residual, steps in zip(
-            map(Status, found.status.tolist()), found.residual, found.iterations, strict=True
-        )
-    ]
-    return found.pose, legs, answers
-
-
-def _placed(
-    platform: Platform, values: Array, names: tuple[str, ...]
-) -> tuple[Pose, Array, list[Answer]]:
-    pose, _ = poses_from_columns(values, names)
-    with np.errstate(invalid="ignore"):
-        legs = leg_lengths(platform, pose)
-    outcomes = [PLACED[code] for code in placed(platform, pose, legs)]
-    answers = [Answer(one.usable, one.text, "inverse kinematics") for one in outcomes]
-    return pose, legs, answers

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from gough.columns import LEGS
 from gough.errors import InputError
-from gough.files.csv_source import CsvSource
-from gough.files.sink import CsvSink
+from gough.files.csv import CsvSink, CsvSource
 
 from .conftest import csv_text
 

@@ -12,8 +12,8 @@ import pytest
 
 from gough.columns import LEGS
 from gough.errors import InputError
-from gough.files.block import Block
-from gough.files.source import open_source
+from gough.files.formats import open_source
+from gough.files.rows import Block
 
 from .conftest import parquet_table
 

@@ -1,28 +1,27 @@
-"""Parquet files as blocks of rows."""
+"""Parquet files, read and written in blocks of rows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import BinaryIO
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from gough.arrow import check_number, to_float
+from gough.columns import STATUS
 from gough.errors import InputError
-from gough.files.block import Block
+from gough.files.rows import Block
+from gough.tables import check_number
 
 PAGE_BUFFER = 1 << 20  # bytes read ahead in each column
+ROW_GROUP = 1 << 18  # rows
 
 
 class ParquetSource:
     """Rows of a Parquet file.
 
-    Attributes:
-        where: what to call the file in messages.
-        columns: the names of its columns.
-        metadata: text that the file carries, such as the platform it belongs to.
-        total, done: rows there are and rows read.
+    See `Source`; `total` and `done` count rows.
 
     Raises:
         InputError: not a Parquet file, cut off, or without rows.
@@ -59,22 +58,14 @@ class ParquetSource:
         keep_bad: bool = False,
         typed: bool = False,
     ) -> Iterator[Block]:
-        """The file, `rows` rows at a time; `keep_bad` and `typed` change nothing here.
-
-        Raises:
-            InputError: a column of another type than numbers, or a damaged part.
-        """
         for name in numbers:
             self._check_number(name)
         wanted = list(dict.fromkeys([*keep, *numbers]))
         batches = self._file.iter_batches(batch_size=rows, columns=wanted)
         while (batch := self._next(batches)) is not None:
-            table = pa.Table.from_batches([batch]).select(wanted)
-            for name in numbers:
-                column = to_float(table.column(name))
-                table = table.set_column(table.column_names.index(name), name, column)
             first = self.done + 1
             self.done += len(batch)
+            table = pa.Table.from_batches([batch])
             yield Block(table, lambda row, first=first: f"row {first + row}")
 
     def close(self) -> None:
@@ -98,8 +89,55 @@ class ParquetSource:
         check_number(self.where, name, kind, value)
 
 
+class ParquetSink:
+    """Parquet, zstd-compressed; floats split by byte, which compresses them best."""
+
+    def __init__(self, file: BinaryIO, metadata: Mapping[str, str]) -> None:
+        self._file, self._metadata = file, dict(metadata)
+        self._waiting: list[pa.Table] = []
+        self._writer: pq.ParquetWriter | None = None
+
+    def write(self, table: pa.Table) -> None:
+        """Append rows; they are written a row group at a time."""
+        self._waiting.append(table)
+        if sum(t.num_rows for t in self._waiting) >= ROW_GROUP:
+            self._flush()
+
+    def finish(self) -> None:
+        """Write the last rows and the footer."""
+        self._flush()
+        if self._writer is not None:
+            self._writer.close()
+
+    def close(self) -> None:
+        """Release the writer after an error; after `finish` this does nothing."""
+        if self._writer is not None and self._writer.is_open:
+            with suppress(Exception):  # it tries to write a footer to a file that may be full
+                self._writer.close()
+
+    def _flush(self) -> None:
+        if not self._waiting:
+            return
+        table = pa.concat_tables(self._waiting)
+        self._waiting = []
+        if self._writer is None:
+            self._writer = self._open(table.schema)
+        self._writer.write_table(table, row_group_size=2 * ROW_GROUP)
+
+    def _open(self, schema: pa.Schema) -> pq.ParquetWriter:
+        options: dict[str, Any] = {
+            "compression": "zstd",
+            "use_dictionary": [STATUS] if STATUS in schema.names else False,
+            "use_byte_stream_split": [f.name for f in schema if pa.types.is_floating(f.type)],
+            "write_page_checksum": True,  # damage on the way is noticed when the file is read
+        }
+        writer = pq.ParquetWriter(self._file, schema.with_metadata(None), **options)
+        writer.add_key_value_metadata(self._metadata)
+        return writer
+
+
 def _not_parquet(file: BinaryIO, error: Exception) -> str:
-    """Why a file could not be opened as Parquet, and what to do."""
+    """The reason why a file could not be opened as Parquet, and the cure."""
     try:
         file.seek(0)
         start = file.read(4)

@@ -1,0 +1,377 @@
+"""CSV files, and standard input and output, read and written in blocks of rows."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import BinaryIO
+
+import pyarrow as pa
+import pyarrow.csv as pacsv
+
+from gough.errors import GoughError, InputError
+from gough.files.rows import Block
+
+HEAD = 1 << 16  # bytes read to find the header
+LONGEST_LINE = 1 << 24  # bytes; a "line" beyond it means wrong line ends or an open quote
+DELIMITERS = (",", ";", "\t", "|")
+COMPRESSED = {
+    b"\x1f\x8b": "gzip",
+    b"(\xb5/\xfd": "zstd",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+}
+# text that stands for "no value" in a number column
+MISSING = ("", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
+
+
+class CsvSource:
+    """Rows of a CSV file: a header line, then fields separated by comma, semicolon, tab or bar.
+
+    See `Source`; `total` and `done` count bytes, `total` is None for a pipe, `metadata` is empty.
+
+    Raises:
+        InputError: the file is empty, is not CSV text, or has a header and no rows.
+    """
+
+    def __init__(self, file: BinaryIO, where: str, total: int | None) -> None:
+        self.where, self.total, self.done = where, total, 0
+        self.metadata: dict[str, str] = {}
+        self._file = file
+        start = self._read(HEAD)
+        _check_text(where, start)
+        header, self._rest = self._split_header(start.removeprefix(b"\xef\xbb\xbf"))
+        self.columns, self._delimiter = _read_header(where, header)
+        self._first_line = 1 + header.count(b"\n")
+        while not self._rest.strip():
+            more = self._read(HEAD)
+            if not more:
+                raise InputError(f"{where}: holds a header and no rows; expected a row per pose")
+            self._rest += more
+
+    def blocks(
+        self,
+        numbers: Sequence[str],
+        keep: Sequence[str] = (),
+        *,
+        rows: int,
+        keep_bad: bool = False,
+        typed: bool = False,
+    ) -> Iterator[Block]:
+        types = {name: pa.string() for name in keep} | {name: pa.float64() for name in numbers}
+        # pyarrow catches Ctrl-C itself while it reads CSV, and loses it in blocks this small
+        pa.enable_signal_handlers(False)
+        for line, data in self._chunks(rows):
+            if typed:
+                text = {name: pa.string() for name in keep if name not in numbers}
+                table = self._block(data, line, text, keep_bad=True).table
+                types |= {name: _number_type(table.column(name)) for name in text}
+                typed = False
+            block = self._block(data, line, types, keep_bad)
+            if len(block):
+                yield block
+
+    def close(self) -> None:
+        """Close the file; standard input stays open."""
+        if self._file is not sys.stdin.buffer:
+            self._file.close()
+
+    # ---- bytes to lines ---------------------------------------------------------------
+
+    def _read(self, count: int) -> bytes:
+        try:
+            data = self._file.read(count)
+        except OSError as error:
+            raise InputError(f"{self.where}: cannot be read: {error.strerror}") from None
+        self.done += len(data)
+        return data
+
+    def _split_header(self, start: bytes) -> tuple[bytes, bytes]:
+        """The header line with its end, and the bytes after it."""
+        while (end := _first_line_end(start)) == 0:
+            more = self._read(HEAD)
+            if not more:
+                return start, b""
+            start += more
+            if len(start) > LONGEST_LINE:
+                raise InputError(f"{self.where}: line 1 has no end; expected lines of text")
+        return start[:end], start[end:]
+
+    def _chunks(self, rows: int) -> Iterator[tuple[int, bytes]]:
+        """(number of the first line, whole lines) until the end of the file."""
+        line, rest = self._first_line, self._rest
+        per_row = (rest.find(b"\n") + 1) or len(rest)
+        size = max(rows * per_row, 1 << 8)
+        while data := rest + (self._read(size - len(rest)) if len(rest) < size else b""):
+            # a block ends where a line ends, or where the file does
+            end = _last_line_end(data, size) if len(data) >= size else len(data)
+            if end:
+                yield line, data[:end]
+                line += data.count(b"\n", 0, end)
+            elif size > LONGEST_LINE:
+                raise InputError(
+                    f"{self.where}: line {line}: no end found; put the row's quotation marks in "
+                    "order, and end lines with LF or CRLF"
+                )
+            else:
+                size *= 2
+            rest = data[end:]
+
+    # ---- lines to columns -------------------------------------------------------------
+
+    def _block(
+        self, data: bytes, line: int, types: dict[str, pa.DataType], keep_bad: bool
+    ) -> Block:
+        """The columns `types` of whole lines, of which the first is line number `line`.
+
+        pyarrow reads them fast, but names no line, or the wrong one, where it cannot; such a
+        block is read again row by row.
+        """
+        try:
+            table = pacsv.read_csv(
+                pa.BufferReader(data),
+                read_options=pacsv.ReadOptions(column_names=self.columns),
+                parse_options=pacsv.ParseOptions(
+                    delimiter=self._delimiter, newlines_in_values=b'"' in data
+                ),
+                convert_options=pacsv.ConvertOptions(
+                    column_types=types,
+                    include_columns=list(types),
+                    null_values=MISSING,
+                    strings_can_be_null=False,
+                ),
+            )
+        except pa.ArrowInvalid:
+            return self._block_row_by_row(data, line, types, keep_bad)
+
+        def place(row: int) -> str:
+            return f"line {next(islice(self._fields(data, line), row, None))[0]}"
+
+        return Block(table, place)
+
+    def _block_row_by_row(
+        self, data: bytes, line: int, types: dict[str, pa.DataType], keep_bad: bool
+    ) -> Block:
+        """The same, slowly, with the reason for every row that cannot be read."""
+        lines: list[int] = []
+        rows: list[list[str]] = []
+        bad: dict[int, str] = {}
+        for number, fields in self._fields(data, line):
+            if len(fields) != len(self.columns):
+                count = f"{len(fields)} field{'s' * (len(fields) != 1)}"
+                bad[len(rows)] = f"found {count}, expected {len(self.columns)} as in the header"
+                fields = [""] * len(self.columns)
+            lines.append(number)
+            rows.append(fields)
+        columns = {}
+        for name, kind in types.items():
+            place = self.columns.index(name)
+            values: list = [_absent(kind)] * len(rows)
+            for row, fields in enumerate(rows):
+                try:
+                    values[row] = _value(fields[place], kind)
+                except ValueError:
+                    bad.setdefault(row, f"column {name}: {_complaint(fields[place], kind)}")
+            columns[name] = pa.array(values, kind)
+        if bad and not keep_bad:
+            raise InputError(
+                f"{self.where}: line {lines[min(bad)]}: {bad[min(bad)]}; correct the row, or pass "
+                "--keep-bad-rows"
+            )
+        return Block(pa.table(columns), lambda row: f"line {lines[row]}", dict(sorted(bad.items())))
+
+    def _fields(self, data: bytes, line: int) -> Iterator[tuple[int, list[str]]]:
+        """(line, fields) of every row that is not empty.
+
+        Raises:
+            InputError: a quoted field without an end.
+        """
+        text = io.StringIO(data.decode("utf-8", errors="surrogateescape"), newline="")
+        reader = csv.reader(text, delimiter=self._delimiter, strict=True)
+        number = line
+        try:
+            for fields in reader:
+                if fields:
+                    yield number, fields
+                number = line + reader.line_num
+        except csv.Error as error:
+            raise InputError(
+                f"{self.where}: line {number}: {error}; put the row's quotation marks in order"
+            ) from None
+
+
+class CsvSink:
+    """CSV with commas and a header line; numbers in the fewest digits that give them back."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._begun = file, False
+
+    def write(self, table: pa.Table) -> None:
+        """Append rows.
+
+        Raises:
+            GoughError: a kept column of a type that CSV cannot hold.
+        """
+        if not self._begun:
+            text = io.StringIO()
+            csv.writer(text, lineterminator="\n").writerow(table.column_names)
+            self._file.write(text.getvalue().encode())
+            self._begun = True
+        self._file.write(_csv_rows(table))
+
+
+def _csv_rows(table: pa.Table) -> bytes:
+    columns = [
+        c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c for c in table.columns
+    ]
+    table = pa.table(columns, names=table.column_names)
+    # pyarrow's "needed" quotes all text; try without, which it refuses where quotes are needed
+    problem = ""
+    for style in ("none", "needed"):
+        buffer = pa.BufferOutputStream()
+        options = pacsv.WriteOptions(include_header=False, quoting_style=style)
+        try:
+            pacsv.write_csv(table, buffer, options)
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
+            problem = str(error)
+        else:
+            return buffer.getvalue().to_pybytes()
+    nested = [f"column {f.name} ({f.type})" for f in table.schema if pa.types.is_nested(f.type)]
+    what = " and ".join(nested) or problem.splitlines()[0]
+    raise GoughError(f"{what} cannot be written as CSV; leave it out or write .parquet")
+
+
+# ---- fields ---------------------------------------------------------------------------
+
+
+def _absent(kind: pa.DataType) -> object:
+    """The value of an empty field."""
+    if pa.types.is_floating(kind):
+        return math.nan
+    return "" if pa.types.is_string(kind) else None
+
+
+def _value(text: str, kind: pa.DataType) -> object:
+    """The value of a field.
+
+    Raises:
+        ValueError: it is not of this kind.
+    """
+    if pa.types.is_string(kind):
+        text.encode()  # fails where a byte was not UTF-8
+        return text
+    bare = text.strip()
+    if bare in MISSING:
+        return _absent(kind)
+    if "_" in bare or not bare.isascii():  # Python reads 1_000 as a number, CSV files do not
+        raise ValueError
+    if pa.types.is_floating(kind):
+        return float(bare)
+    number = int(bare)
+    if not -(1 << 63) <= number < 1 << 63:
+        raise ValueError
+    return number
+
+
+def _complaint(text: str, kind: pa.DataType) -> str:
+    """What is wrong with a field that is not of this kind."""
+    if pa.types.is_string(kind):
+        return "not UTF-8 text; save the file as UTF-8"
+    shown = repr(text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")[:40])
+    wanted = "a whole number" if pa.types.is_integer(kind) else "a number"
+    comma = text.count(",") == 1 and text.replace(",", "").strip().lstrip("+-").isdigit()
+    point = " with a decimal point, not a comma" if comma else ""
+    return f"found {shown}, expected {wanted}{point}"
+
+
+def _number_type(text: pa.ChunkedArray) -> pa.DataType:
+    """The type of a column of text that holds nothing but whole or decimal numbers, else text."""
+    for kind in (pa.int64(), pa.float64()):
+        try:
+            numbers = text.cast(kind)
+        except pa.ArrowInvalid:
+            continue
+        # 007 and +1 are labels that happen to be digits: as numbers they would change
+        if kind == pa.float64() or numbers.cast(pa.string()).equals(text):
+            return kind
+        return pa.string()
+    return pa.string()
+
+
+# ---- header ---------------------------------------------------------------------------
+
+
+def _first_line_end(data: bytes) -> int:
+    """End of the first line that does not end inside quotation marks, or 0."""
+    end = 0
+    while (end := data.find(b"\n", end) + 1) and data.count(b'"', 0, end) % 2:
+        pass
+    return end
+
+
+def _last_line_end(data: bytes, limit: int) -> int:
+    """End of the last line before `limit` that does not end inside quotation marks, or 0."""
+    end = data.rfind(b"\n", 0, limit) + 1
+    if b'"' not in data:
+        return end
+    quotes = data.count(b'"', 0, end)
+    while end and quotes % 2:
+        previous = data.rfind(b"\n", 0, end - 1) + 1
+        quotes -= data.count(b'"', previous, end)
+        end = previous
+    return end
+
+
+def _check_text(where: str, start: bytes) -> None:
+    """Raise unless a file begins like CSV text.
+
+    Raises:
+        InputError: empty, Parquet, compressed, UTF-16 or another binary file.
+    """
+    if not start.strip():
+        raise InputError(f"{where}: is empty; expected a header line and a row per pose")
+    if start.startswith(b"PAR1"):
+        raise InputError(f"{where}: holds Parquet, not CSV; rename it to end in .parquet")
+    for magic, name in COMPRESSED.items():
+        if start.startswith(magic):
+            raise InputError(f"{where}: is compressed ({name}); unpack it first")
+    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError(f"{where}: is UTF-16 text; save it as UTF-8")
+    if b"\0" in start:
+        raise InputError(f"{where}: holds binary data, not CSV text")
+
+
+def _read_header(where: str, header: bytes) -> tuple[list[str], str]:
+    """Column names and delimiter."""
+    try:
+        text = header.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{where}: line 1: byte {error.start + 1} is not UTF-8 text; save the file as UTF-8"
+        ) from None
+    text = text.rstrip("\r\n")
+    if "\r" in text:
+        raise InputError(f"{where}: its lines end in CR alone; save it with LF or CRLF line ends")
+    delimiter = max(DELIMITERS, key=text.count)
+    try:
+        fields = next(csv.reader([text], delimiter=delimiter, strict=True), [])
+    except csv.Error as error:
+        raise InputError(f"{where}: line 1: {error}; expected column names") from None
+    names = [name.strip() for name in fields]
+    if names and all(map(_is_number, names)):
+        raise InputError(
+            f"{where}: line 1 holds numbers; put a line with the names of the columns above it"
+        )
+    return names, delimiter
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

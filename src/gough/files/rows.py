@@ -1,0 +1,116 @@
+"""Rows of a file in blocks, and the interface of the objects that read and write them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import pyarrow as pa
+
+from gough.checks import Array
+from gough.errors import GoughError
+from gough.tables import arrow_values
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Options for reading a file.
+
+    Attributes:
+        keep: columns to copy to the output unchanged.
+        keep_bad_rows: mark rows with text in a number column, or with too few or too many
+            fields, as invalid instead of raising an error.
+        ignore_platform: accept a file that was written for another platform.
+        block_rows: rows held in memory at a time.
+    """
+
+    keep: tuple[str, ...] = ()
+    keep_bad_rows: bool = False
+    ignore_platform: bool = False
+    block_rows: int = 65536
+
+    def __post_init__(self) -> None:
+        if self.block_rows < 1:
+            raise GoughError(f"block_rows: expected 1 or more, found {self.block_rows}")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive rows of a file.
+
+    Attributes:
+        table: number columns, with gaps where fields are empty; kept columns as they were read.
+        place: gives the place in the file of row i (from 0) of the block, such as "line 17".
+        bad: reason for each row that could not be read.
+    """
+
+    table: pa.Table
+    place: Callable[[int], str]
+    bad: dict[int, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return self.table.num_rows
+
+    def numbers(self, names: Sequence[str]) -> Array:
+        """The columns `names` as an array (N, len(names)).
+
+        Absent values are NaN, and so are all values of a row that could not be read.
+        """
+        array = np.stack([arrow_values(self.table.column(name)) for name in names], axis=-1)
+        array[list(self.bad)] = np.nan
+        return array
+
+
+class Source(Protocol):
+    """A file being read.
+
+    Attributes:
+        where: name of the file for messages.
+        columns: names of its columns.
+        metadata: text that the file carries, such as the platform it belongs to.
+        total, done: size of the file and how much of it has been read, in the same unit; total
+            is None where it is not known.
+    """
+
+    where: str
+    columns: list[str]
+    metadata: dict[str, str]
+    total: int | None
+    done: int
+
+    def blocks(
+        self,
+        numbers: Sequence[str],
+        keep: Sequence[str] = (),
+        *,
+        rows: int,
+        keep_bad: bool = False,
+        typed: bool = False,
+    ) -> Iterator[Block]:
+        """Read the rest of the file, about `rows` rows at a time.
+
+        Args:
+            numbers: columns to read as numbers.
+            keep: columns to copy unchanged: as text from CSV, in their type from Parquet.
+            rows: rows in a block.
+            keep_bad: mark rows that cannot be read instead of raising an error.
+            typed: read kept columns of CSV as numbers if the first block holds nothing else.
+
+        Raises:
+            InputError: a value that is no number, or a damaged file; with its place.
+        """
+        ...
+
+    def close(self) -> None:
+        """Close the file."""
+        ...
+
+
+class Sink(Protocol):
+    """A file being written."""
+
+    def write(self, table: pa.Table) -> None:
+        """Append rows; all tables must have the same columns."""
+        ...

@@ -1,0 +1,175 @@
+"""A file of poses or of leg readings, read as poses with their readings and statuses.
+
+    with open_trajectory("log.csv", platform, time="time") as file:
+        for rows in file.blocks():
+            found = file.solve(rows)
+
+Reading and solving are two steps, so that what shows few of many rows solves only those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gough.checks import Array
+from gough.columns import LEGS, STATUS, checked, pose_or_leg_columns
+from gough.files.formats import open_source
+from gough.files.metadata import check_same
+from gough.files.placing import PLACED, placed
+from gough.files.rows import Block, Reading, Source
+from gough.kinematics import leg_lengths
+from gough.platform import Platform
+from gough.pose import Pose, poses_from_columns
+from gough.status import Outcome, Status
+
+UNUSABLE = {status.label: status for status in Status if not status.usable}
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Rows of a file as poses and readings; NaN where there are none.
+
+    Attributes:
+        number: (n,) rows' numbers in the file, from 1.
+        time: (n,) the column of times; NaN where absent.
+        pose: batch (n,).
+        legs: (n, 6) readings.
+        outcomes: (n,) statuses: `Status` for a file of readings; `InverseStatus` for one of poses,
+            or the `Status` that the file states if that is not usable.
+        usable: (n,) True for rows with a usable pose.
+        residual: (n,) largest strut error [platform unit]; zero for a file of poses.
+        iterations: (n,) Newton steps; zero for a file of poses.
+    """
+
+    number: NDArray[np.int64]
+    time: Array
+    pose: Pose
+    legs: Array
+    outcomes: list[Outcome]
+    usable: NDArray[np.bool_]
+    residual: Array
+    iterations: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryFile:
+    """An open file of poses or of leg readings; of one that holds both, the poses.
+
+    Attributes:
+        columns: names of the columns of a pose, or `LEGS`.
+        time: name of the column of times, or None.
+        seed: first guess for leg readings, as for `gough.solve`.
+    """
+
+    source: Source
+    platform: Platform
+    columns: tuple[str, ...]
+    time: str | None
+    seed: str
+    reading: Reading
+
+    @property
+    def has_poses(self) -> bool:
+        """True for a file of poses, False for one of leg readings."""
+        return self.columns != LEGS
+
+    def blocks(self, progress: Callable[[Source], None] | None = None) -> Iterator[Array]:
+        """Rows (n, 3 + K), block by block: number from 1, time, unusable status or -1, `columns`.
+
+        Args:
+            progress: called after every block.
+        """
+        time, count = self.time, 0
+        numbers = (*self.columns, *([] if time is None else [time]))
+        for block in read_columns(self.source, numbers, self.reading):
+            rows = np.full((len(block), 3 + len(self.columns)), np.nan)
+            rows[:, 0] = np.arange(count + 1, count + 1 + len(block))
+            if time is not None:
+                rows[:, 1] = block.numbers([time])[:, 0]
+            rows[:, 2] = unusable_status(block)
+            rows[:, 3:] = block.numbers(self.columns)
+            count += len(block)
+            yield rows
+            if progress:
+                progress(self.source)
+
+    def solve(self, rows: Array) -> Trajectory:
+        """Calculate the readings of poses, or solve readings for poses."""
+        number, time, values = rows[:, 0].astype(np.int64), rows[:, 1], rows[:, 3:]
+        if not self.has_poses:
+            found = self._solver(values)
+            outcomes: list[Outcome] = [Status(code) for code in found.status.tolist()]
+            return Trajectory(
+                number, time, found.pose, values, outcomes, found.usable, found.residual,
+                found.iterations,
+            )  # fmt: skip
+        pose, _ = poses_from_columns(values, self.columns)
+        with np.errstate(invalid="ignore"):
+            legs = leg_lengths(self.platform, pose)
+        stated = rows[:, 2].astype(np.int64)
+        outcomes = [
+            PLACED[code] if one < 0 else Status(one)
+            for code, one in zip(placed(self.platform, pose, legs), stated.tolist(), strict=True)
+        ]
+        usable = np.all(np.isfinite(legs), axis=-1) & (stated < 0)
+        none = np.zeros(len(rows))
+        return Trajectory(number, time, pose, legs, outcomes, usable, none, none.astype(np.int32))
+
+    @cached_property
+    def _solver(self) -> Callable:
+        from gough.fk.solve import solve
+
+        return partial(solve, self.platform, seed=self.seed)
+
+
+@contextmanager
+def open_trajectory(
+    path: str | Path,
+    platform: Platform,
+    *,
+    time: str | None = None,
+    seed: str = "auto",
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+) -> Iterator[TrajectoryFile]:
+    """Open a file of poses or of leg readings.
+
+    Args:
+        path: .csv or .parquet, or "-" for standard input.
+        platform: the machine.
+        time: name of a column of times.
+        seed: first guess for leg readings, as for `gough.solve`.
+        reading: options for reading the file.
+
+    Raises:
+        GoughError: a name of no known format.
+        InputError: a file that cannot be read, or without the columns.
+    """
+    with closing(open_source(path)) as source:
+        columns = pose_or_leg_columns(source.where, source.columns)
+        if not reading.ignore_platform:
+            check_same(source.where, source.metadata, platform)
+        if time is not None:
+            checked(source.where, source.columns, (time,))
+        yield TrajectoryFile(source, platform, columns, time, seed, reading)
+
+
+def read_columns(source: Source, names: tuple[str, ...], reading: Reading) -> Iterator[Block]:
+    """Read number columns of an open file, with its column of statuses if it has one."""
+    keep = (STATUS,) if STATUS in source.columns and STATUS not in names else ()
+    numbers = tuple(dict.fromkeys(names))
+    return source.blocks(numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
+
+
+def unusable_status(block: Block) -> NDArray[np.int64]:
+    """Numbers (n,) of the statuses that a column of the file states if not usable, else -1."""
+    if STATUS not in block.table.column_names:
+        return np.full(len(block), -1)
+    words = block.table.column(STATUS).to_pylist()
+    return np.array([int(UNUSABLE.get(str(word), -1)) for word in words])

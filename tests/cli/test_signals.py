@@ -1,0 +1,38 @@
+"""Requests to stop survive libraries that swallow exceptions, and do not disturb tidying up."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+
+import pytest
+
+from gough.commands import signals
+
+
+@pytest.fixture(autouse=True)
+def fresh(monkeypatch):
+    monkeypatch.setattr(signals, "_asked", None)
+    monkeypatch.setattr(signals, "_since", 0.0)
+
+
+def test_nothing_happens_unless_asked():
+    signals.check()
+    assert signals.asked() is None
+
+
+def test_a_swallowed_request_is_raised_again():
+    with contextlib.suppress(BaseException):
+        signals._note(signal.SIGTERM, None)
+    with pytest.raises(signals.Stopped) as stop:
+        signals.check()
+    assert stop.value.number == signals.asked() == signal.SIGTERM
+
+
+def test_a_second_request_waits_while_files_are_tidied_up(monkeypatch):
+    with pytest.raises(signals.Stopped):
+        signals._note(signal.SIGINT, None)
+    signals._note(signal.SIGINT, None)
+    monkeypatch.setattr(signals, "TIDYING", -1.0)
+    with pytest.raises(signals.Stopped):
+        signals._note(signal.SIGINT, None)
