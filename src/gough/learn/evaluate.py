@@ -19,7 +19,7 @@ from gough.learn.models.polynomial import PolynomialGuess
 from gough.learn.outcomes import Outcome, outcome, same_pose
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.seeds.base import PolynomialSeed, Seed
+from gough.seeds.base import Seed, find_seed
 from gough.seeds.network import find_network, shipped_names
 
 HELD_OUT = 20_240_314  # seed of the test poses, which no training uses
@@ -51,8 +51,8 @@ class Row:
 
 
 def default_names(platform: Platform) -> list[str]:
-    """Home, polynomials, and all networks that come with the package for this platform."""
-    return ["home", *(f"polynomial-{d}" for d in DEGREES), *shipped_names(platform)]
+    """Home, Taylor series, polynomials, and all networks that come for this platform."""
+    return ["home", "taylor-2", *(f"polynomial-{d}" for d in DEGREES), *shipped_names(platform)]
 
 
 def held_out(platform: Platform, count: int, same_assembly: bool) -> tuple[Pose, Array]:
@@ -90,8 +90,8 @@ def _row(platform: Platform, name: str, truth: Pose, legs: Array, same_assembly:
 
 def _seed(platform: Platform, name: str, same_assembly: bool) -> tuple:
     """The first guess of a name; its parameters, training time and seed."""
-    if name == "home":
-        return PolynomialSeed(platform, 0), None, None, None
+    if name == "home" or name.startswith("taylor-"):
+        return find_seed(platform, name), None, None, None
     if name.startswith("polynomial-"):
         degree = name.removeprefix("polynomial-")
         if not degree.isdigit():

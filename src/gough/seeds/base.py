@@ -13,6 +13,7 @@ from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.seeds import cache, polynomial
+from gough.seeds.taylor import TaylorSeed
 
 DEGREE = 3  # fast to evaluate, and the first degree that seldom leads to another mode
 
@@ -119,6 +120,8 @@ def _named(platform: Platform, name: str) -> Seed:
         return _polynomial(platform, 0)
     if kind == "polynomial" and (degree == "" or degree.isdecimal()):
         return _polynomial(platform, int(degree or DEGREE))
+    if kind == "taylor" and (degree == "" or degree.isdecimal()):
+        return TaylorSeed(platform, int(degree or 2))
     return _network(platform, name)
 
 
@@ -132,7 +135,7 @@ def _network(platform: Platform, name: str) -> Seed:
     if Path(name).exists() or Path(name).suffix or len(Path(name).parts) > 1:
         return find_network(platform, name)
     raise GoughError(
-        f"seed: unknown name {name!r}; expected auto, home, polynomial, polynomial-DEGREE, the "
+        f"seed: unknown name {name!r}; expected auto, home, taylor-ORDER, polynomial-DEGREE, the "
         f"path of a trained network, or one that comes with gough for platform {platform.name!r} "
         f"as it is now ({', '.join(ours) or 'there is none: see gough train'})"
     )
