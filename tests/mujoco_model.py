@@ -60,7 +60,7 @@ def _arm(platform: Platform, i: int) -> str:
     return (
         f'<body pos="{_text(platform.base[i])}" xyaxes="{axes}"><joint type="hinge" axis="0 0 1"/>'
         f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-        f'<site name="b{i}" pos="{arms.arm_length!r} 0 0"/></body>'
+        f'<site name="b{i}" pos="{float(arms.arm_length[i])!r} 0 0"/></body>'
     )
 
 

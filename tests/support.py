@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from hypothesis import strategies as st
@@ -65,8 +65,13 @@ def assert_same_pose(a: Pose, b: Pose, tolerance: float = 1e-13) -> None:
 # ---- platforms ------------------------------------------------------------------------
 
 
-def random_platform(seed: int, legs: str = "telescopic") -> Platform:
-    """A hexapod a little off the regular shape, with every optional field, far from singular."""
+def random_platform(seed: int, legs: str = "telescopic", sensors: bool = False) -> Platform:
+    """A hexapod a little off the regular shape, with every optional field, far from singular.
+
+    Args:
+        sensors: legs read through an offset and a gain of their own; rotary legs have arms and
+            rods of different lengths, too.
+    """
     rng = np.random.default_rng(seed)
     size = 10 ** rng.uniform(-3, 3)
     base = _ring(rng, radius=1.0, first=-20.0, half_gap=20.0)
@@ -85,8 +90,25 @@ def random_platform(seed: int, legs: str = "telescopic") -> Platform:
         workspace=Workspace.about_home(0.05 * size, 5.0),
         rotary=arms,
     )
+    if sensors:
+        unit = 1.0 if legs == "rotary" else size
+        platform = replace(
+            platform,
+            offset=rng.uniform(-0.1, 0.1, 6) * unit,
+            gain=rng.choice([-1.0, 1.0], 6) * rng.uniform(0.5, 2.0, 6),
+            rotary=arms and _uneven(arms, rng),
+        )
     reach = 0.5 if legs == "rotary" else 0.5 * size
-    return replace(platform, stroke=platform.home_legs[:, None] + [-reach, reach])
+    reach = np.abs(reach / platform.gain)[:, None] * [-1.0, 1.0]
+    return replace(platform, stroke=platform.home_legs[:, None] + reach)
+
+
+def _uneven(arms: RotaryArms, rng: np.random.Generator) -> RotaryArms:
+    """Arms and rods whose lengths differ by up to a hundredth."""
+    spread = 1 + rng.uniform(-0.01, 0.01, (2, 6))
+    return replace(
+        arms, arm_length=spread[0] * arms.arm_length, rod_length=spread[1] * arms.rod_length
+    )
 
 
 def _ring(rng: np.random.Generator, radius: float, first: float, half_gap: float) -> Floats:
@@ -108,7 +130,10 @@ def _arms(base: Floats, size: float) -> RotaryArms:
 
 
 random_platforms = st.builds(
-    random_platform, seeds, st.sampled_from(["telescopic", "length_change", "rotary"])
+    random_platform,
+    seeds,
+    st.sampled_from(["telescopic", "length_change", "rotary"]),
+    st.booleans(),
 )
 
 
@@ -131,8 +156,9 @@ def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
         )
     if space is not None:
         space = replace(space, translation=factor * space.translation)
-    if stroke is not None and platform.legs != "rotary":
-        stroke = factor * stroke
+    along = 1.0 if platform.legs == "rotary" else factor
+    if stroke is not None:
+        stroke = along * stroke
     return replace(
         platform,
         base=factor * platform.base,
@@ -141,6 +167,7 @@ def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
         pivot=None if platform.pivot is None else factor * platform.pivot,
         unit=unit,
         stroke=stroke,
+        offset=along * platform.offset,
         workspace=space,
         rotary=arms,
     )
@@ -151,10 +178,12 @@ def permuted(platform: Platform, order: NDArray[np.intp]) -> Platform:
     arms = platform.rotary
     if arms is not None:
         arms = replace(
-            arms, axis_x=arms.axis_x[order], axis_y=arms.axis_y[order], branch=arms.branch[order]
+            arms, **{field.name: getattr(arms, field.name)[order] for field in fields(arms)}
         )
     return replace(
         platform,
+        offset=platform.offset[order],
+        gain=platform.gain[order],
         base=platform.base[order],
         moving=platform.moving[order],
         stroke=None if platform.stroke is None else platform.stroke[order],

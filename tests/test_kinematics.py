@@ -198,18 +198,19 @@ def test_motor_angles_make_mujocos_rods_the_right_length() -> None:
 
 @given(support.seeds)
 def test_an_arms_tip_is_one_rod_from_the_joint(seed: int) -> None:
-    platform = support.random_platform(seed, "rotary")
+    platform = support.random_platform(seed, "rotary", seed % 2 == 1)
     assert platform.rotary is not None
     poses = support.sample(platform, (10,), seed)
-    angles = leg_lengths(platform, poses)
-    assert np.all(np.abs(angles) <= np.pi)
-    tips, rods = equivalent_struts(platform, angles)
+    readings = leg_lengths(platform, poses)
+    assert np.all(np.abs(readings * platform.gain) <= np.pi)
+    tips, rods = equivalent_struts(platform, readings)
     assert np.all(rods == platform.rotary.rod_length)
     np.testing.assert_allclose(
         np.linalg.norm(gough.joint_positions(platform, poses) - tips, axis=-1), rods, rtol=1e-13
     )
     radius = np.linalg.norm(tips - platform.base, axis=-1)
-    np.testing.assert_allclose(radius, platform.rotary.arm_length, rtol=1e-14)
+    arms = np.broadcast_to(platform.rotary.arm_length, radius.shape)
+    np.testing.assert_allclose(radius, arms, rtol=1e-14)
 
 
 @given(support.seeds)
@@ -418,7 +419,7 @@ def test_the_distance_is_that_to_the_nearest_singular_matrix(platform: Platform,
 @given(support.random_platforms, support.seeds)
 def test_joints_move_by_no_more_than_leg_error_over_distance(platform: Platform, seed: int) -> None:
     """What the docstring promises a user, for a small error of the struts."""
-    platform = replace(platform, legs="telescopic", rotary=None, stroke=None)
+    platform = replace(platform, legs="telescopic", rotary=None, stroke=None, offset=0, gain=1)
     pose = support.sample(platform, (), seed)
     rng = np.random.default_rng(seed)
     error = rng.standard_normal(6)

@@ -214,7 +214,7 @@ WRONG_TOML = {
     ),
     "rod is a list": (
         ROTARY_TOML.replace("rod_length = 0.085", "rod_length = [0.085]"),
-        "rotary.rod_length: expected one number, found 1 number in a list",
+        "rotary.rod_length: expected one number, or six for the six legs, got shape (1,)",
     ),
     "rod too long": (
         ROTARY_TOML.replace("rod_length = 0.085", "rod_length = 0.2"),
@@ -374,7 +374,9 @@ def test_the_digest_is_the_same_in_every_version_and_on_every_machine() -> None:
 
 @pytest.mark.parametrize("name", ["reference", "rubin_camera", "reachy_mini"])
 def test_the_digest_tells_every_fact_but_the_name(name: str) -> None:
-    platform = Platform.load(name)
+    sensors = {"offset": np.linspace(0.1, 0.2, 6) * 1e-3, "gain": np.linspace(0.9, 1.1, 6)}
+    plain = replace(Platform.load(name), stroke=None)
+    platform = replace(plain, **sensors)
     digests = {platform.digest}
     stated = {f.name for f in dataclasses.fields(platform) if getattr(platform, f.name) is not None}
     assert platform.to_dict().keys() == stated
@@ -383,7 +385,9 @@ def test_the_digest_tells_every_fact_but_the_name(name: str) -> None:
         digests.add(from_toml(_toml(facts)).digest)
     digests.add(replace(platform, unit="furlong").digest)
     digests.add(replace(platform, workspace=None).digest)
-    assert len(digests) == 3 + len(changed)
+    digests.add(plain.digest)
+    assert len(digests) == 4 + len(changed)
+    assert replace(plain, offset=0, gain=np.ones(6)).digest == plain.digest
     assert replace(platform, name="other").digest == platform.digest
 
 

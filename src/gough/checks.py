@@ -101,3 +101,13 @@ def platform_field(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array
         wanted = f"a number below {LARGEST:g}" if np.isfinite(found) else "a finite number"
         raise PlatformError(f"{name}{place}: expected {wanted}, found {found}")
     return frozen(array)
+
+
+def one_or_six(name: str, value: ArrayLike) -> Array:
+    """A field of a platform that is one number for all legs, or six: as a frozen array (6,)."""
+    array = platform_numbers(name, value)
+    if array.shape not in ((), (6,)):
+        raise PlatformError(
+            f"{name}: expected one number, or six for the six legs, got shape {array.shape}"
+        )
+    return platform_field(name, np.broadcast_to(array, 6), (6,))

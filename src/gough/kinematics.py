@@ -42,8 +42,8 @@ def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
 
     Returns:
         Lengths [platform unit], lengths minus those at home [platform unit], or motor angles
-        [rad], by the platform's kind of leg. NaN where a motor's arm and rod cannot reach, and
-        where a row of a table holds no pose.
+        [rad], by the platform's kind of leg, as sensors with its `gain` and `offset` read them.
+        NaN where a motor's arm and rod cannot reach, and where a row of a table holds no pose.
 
     Raises:
         GoughError: neither poses nor a table, or a table with other columns.
@@ -55,7 +55,7 @@ def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
         (6,)
     """
     vectors = strut_vectors(platform, as_pose(pose))
-    return struts.readings(vectors, platform.zero_lengths, platform.rotary)
+    return struts.readings(vectors, platform.true_at_zero, platform.gain, platform.rotary)
 
 
 def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Array, Array]:
@@ -67,9 +67,8 @@ def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Arra
     Returns:
         Base joints (..., 6, 3) and strut lengths (..., 6) [platform unit].
     """
-    return struts.equivalent(
-        platform.base, platform.zero_lengths, platform.rotary, as_readings(legs)
-    )
+    zero, gain = platform.true_at_zero, platform.gain
+    return struts.equivalent(platform.base, zero, gain, platform.rotary, as_readings(legs))
 
 
 def jacobian(platform: Platform, pose: Pose) -> Array:
@@ -87,7 +86,9 @@ def jacobian(platform: Platform, pose: Pose) -> Array:
         >>> gough.jacobian(platform, platform.sample_poses(5)).shape
         (5, 6, 6)
     """
-    rods, rates = struts.rods_and_rates(strut_vectors(platform, pose), platform.rotary)
+    rods, rates = struts.rods_and_rates(
+        strut_vectors(platform, pose), platform.gain, platform.rotary
+    )
     rows = np.concatenate([rods, np.cross(_levers(platform, pose), rods)], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return rows / rates[..., None]
@@ -120,7 +121,7 @@ def assembly_sign(platform: Platform, pose: Pose) -> Array:
 
 def normalised_jacobian(platform: Platform, pose: Pose) -> Array:
     """Jacobian with rows (n_i, m_i), without units, (..., 6, 6); see `singularity_distance`."""
-    rods, _ = struts.rods_and_rates(strut_vectors(platform, pose), platform.rotary)
+    rods, _ = struts.rods_and_rates(strut_vectors(platform, pose), platform.gain, platform.rotary)
     directions = rods / np.linalg.norm(rods, axis=-1, keepdims=True)
     levers = _levers(platform, pose)
     levers = levers - levers.mean(axis=-2, keepdims=True)

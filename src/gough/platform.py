@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gough import struts
-from gough.checks import Array, frozen, platform_field, platform_numbers
+from gough.checks import Array, frozen, one_or_six, platform_field, platform_numbers
 from gough.errors import PlatformError
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -42,6 +42,10 @@ class Platform:
         legs: "telescopic" (readings are leg lengths), "length_change" (readings are lengths
             minus those at home) or "rotary" (readings are motor angles [rad]).
         stroke: (6, 2) lowest and highest reading of each leg, or one pair for all.
+        offset: (6,) what the ideal reading of each leg is where its sensor reads 0
+            [platform unit], or [rad] for rotary legs; one number for all; zero unless given.
+        gain: (6,) by how much the ideal reading changes for one unit of the sensor's; one number
+            for all; 1 unless given. See `gough.struts` for both; `gough.calibrate` finds them.
         pivot: (3,) point of the platform, in its own coordinates, that poses rotate about.
         workspace: the poses the machine is meant for.
         rotary: the motor arms, for rotary legs only.
@@ -69,6 +73,8 @@ class Platform:
     pivot: Array | None
     workspace: Workspace | None
     rotary: RotaryArms | None
+    offset: Array
+    gain: Array
 
     def __init__(
         self,
@@ -83,6 +89,8 @@ class Platform:
         pivot: ArrayLike | None = None,
         workspace: Workspace | None = None,
         rotary: RotaryArms | None = None,
+        offset: ArrayLike = 0.0,
+        gain: ArrayLike = 1.0,
     ) -> None:
         for field, text in (("unit", unit), ("name", name)):
             if not isinstance(text, str):
@@ -98,6 +106,8 @@ class Platform:
             "pivot": None if pivot is None else platform_field("pivot", pivot, (3,)),
             "workspace": workspace,
             "rotary": rotary,
+            "offset": one_or_six("offset", offset),
+            "gain": _nonzero("gain", one_or_six("gain", gain)),
         }
         for field, value in fields.items():
             object.__setattr__(self, field, value)
@@ -149,14 +159,17 @@ class Platform:
         return frozen(np.linalg.norm(self._home_struts(), axis=-1))
 
     @cached_property
-    def zero_lengths(self) -> Array:
-        """Length at which a leg reads 0, (6,) [platform unit]; zeros but for length changes."""
-        return self.home_lengths if self.legs == "length_change" else frozen(np.zeros(6))
+    def true_at_zero(self) -> Array:
+        """Strut length [platform unit] or motor angle [rad] of a leg that reads 0, (6,)."""
+        if self.legs != "length_change":
+            return self.offset
+        return frozen(self.home_lengths + self.offset)
 
     @cached_property
     def home_legs(self) -> Array:
-        """Readings at home (6,), which are lengths, zeros (length_change) or angles [rad]."""
-        return frozen(struts.readings(self._home_struts(), self.zero_lengths, self.rotary))
+        """Readings at home (6,); zeros for length changes without offset."""
+        zero, gain = self.true_at_zero, self.gain
+        return frozen(struts.readings(self._home_struts(), zero, gain, self.rotary))
 
     @cached_property
     def size(self) -> float:
@@ -178,13 +191,14 @@ class Platform:
         for key in ("pivot", "stroke"):
             if getattr(self, key) is not None:
                 out[key] = getattr(self, key).tolist()
+        for key, usual in (("offset", 0.0), ("gain", 1.0)):
+            if np.any(getattr(self, key) != usual):
+                out[key] = getattr(self, key).tolist()
         out["home"] = {"position": self.home.position.tolist(), "wxyz": self.home.wxyz.tolist()}
         for key in ("workspace", "rotary"):
             part = getattr(self, key)
             if part is not None:
-                out[key] = {
-                    k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(part).items()
-                }
+                out[key] = {k: _plain(k, v) for k, v in vars(part).items()}
         return out
 
     def with_workspace(self, translation: ArrayLike, rotation_deg: ArrayLike) -> Platform:
@@ -345,6 +359,20 @@ def _check_kind(legs: str, workspace: object, rotary: object) -> None:
     if (legs == "rotary") != (rotary is not None):
         need = "needs" if legs == "rotary" else "must not have"
         raise PlatformError(f"rotary: a platform with {legs} legs {need} this table")
+
+
+def _nonzero(name: str, value: Array) -> Array:
+    if np.any(value == 0):
+        leg = int(np.argmin(np.abs(value)))
+        raise PlatformError(f"{name}[{leg}]: expected a number other than 0, found 0.0")
+    return value
+
+
+def _plain(key: str, value: Array) -> list | float:
+    """An array as lists; lengths that six arms share as one number."""
+    if key in ("arm_length", "rod_length") and np.all(value == value[0]):
+        return float(value[0])
+    return value.tolist()
 
 
 def _joints(name: str, value: ArrayLike) -> Array:

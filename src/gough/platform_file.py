@@ -19,7 +19,8 @@ from gough.whole_file import write_whole
 from gough.workspace import Workspace
 
 REQUIRED = ("base", "moving", "home")
-OPTIONAL = ("name", "unit", "legs", "stroke", "pivot", "workspace", "rotary")
+PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
+OPTIONAL = (*PLAIN, "workspace", "rotary")
 TABLES = {
     "home": ("position", "wxyz", "euler_deg"),
     "workspace": ("translation", "rotation_deg"),
@@ -114,7 +115,7 @@ def _from_dict(facts: dict) -> Platform:
                     f"{name}: expected a table with {', '.join(keys)}; found {facts[name]!r}"
                 )
             _known(f"{name}.", facts[name], keys)
-    options = {k: facts[k] for k in ("name", "unit", "legs", "stroke", "pivot") if k in facts}
+    options = {k: facts[k] for k in PLAIN if k in facts}
     return Platform(
         facts["base"],
         facts["moving"],

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from gough.checks import Array, platform_field
+from gough.checks import Array, one_or_six, platform_field
 from gough.errors import PlatformError
 
 
@@ -14,13 +14,13 @@ from gough.errors import PlatformError
 class RotaryArms:
     """Motor arms of a 6-RSS hexapod. Base joint i is the tip of arm i,
 
-        tip_i(q_i) = base_i + arm_length (cos q_i axis_x_i + sin q_i axis_y_i),
+        tip_i(q_i) = base_i + arm_length_i (cos q_i axis_x_i + sin q_i axis_y_i),
 
     and a rod of fixed length joins it to platform joint i.
 
     Attributes:
-        arm_length: from the motor's axis to the tip [platform unit].
-        rod_length: between the two ball joints of a rod [platform unit].
+        arm_length: (6,) from each motor's axis to its arm's tip, or one for all [platform unit].
+        rod_length: (6,) between the two ball joints of each rod, or one for all [platform unit].
         axis_x: (6, 3) unit vectors, where the arm points at angle 0.
         axis_y: (6, 3) unit vectors, where it points at angle +90 deg.
         branch: (6,) of +1 or -1: which of the two motor angles that reach a pose is meant,
@@ -30,24 +30,25 @@ class RotaryArms:
         PlatformError: naming the field, what was found and what was expected.
     """
 
-    arm_length: float
-    rod_length: float
+    arm_length: Array
+    rod_length: Array
     axis_x: Array
     axis_y: Array
     branch: Array
 
     def __init__(
         self,
-        arm_length: float,
-        rod_length: float,
+        arm_length: ArrayLike,
+        rod_length: ArrayLike,
         axis_x: ArrayLike,
         axis_y: ArrayLike,
         branch: ArrayLike,
     ) -> None:
         for name, given in (("arm_length", arm_length), ("rod_length", rod_length)):
-            value = float(platform_field(f"rotary.{name}", given, ()))
-            if value <= 0:
-                raise PlatformError(f"rotary.{name}: expected a length above 0, found {value}")
+            value = one_or_six(f"rotary.{name}", given)
+            if value.min() <= 0:
+                found = value.min()
+                raise PlatformError(f"rotary.{name}: expected a length above 0, found {found}")
             object.__setattr__(self, name, value)
         for name, given, shape in (
             ("axis_x", axis_x, (6, 3)), ("axis_y", axis_y, (6, 3)), ("branch", branch, (6,))

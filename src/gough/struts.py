@@ -5,9 +5,15 @@ joint b_i and platform joint p_i the strut is
 
     d_i = R (p_i - c) + c + t - b_i,        length |d_i|
 
-(Merlet, Parallel Robots, 2nd ed., sec. 5.1). A telescopic leg reads |d_i|, a leg that reads a
-length change |d_i| minus its value at home; a rotary leg has a rod of fixed length whose lower
-end the motor arm moves. `gough.kinematics` offers these functions for a `Platform`.
+(Merlet, Parallel Robots, 2nd ed., sec. 5.1). A telescopic leg moves |d_i|; so does a leg that
+reads a length change, which counts from the length at home h_i; a rotary leg has a rod of fixed
+length whose lower end the motor arm moves, at the angle q_i. What the sensor reads is
+
+    |d_i|  or  q_i  =  gain_i reading_i + zero_i,        zero_i = offset_i (+ h_i, length changes)
+
+with the platform's fields `gain` (1 unless stated) and `offset` (0 unless stated). So the offset
+is what the leg's ideal reading is where its sensor reads 0, and the gain is by how much that
+changes for one unit of the sensor. `gough.kinematics` offers these functions for a `Platform`.
 """
 
 from __future__ import annotations
@@ -28,36 +34,39 @@ def joints(moving: Array, pivot: Array, position: Array, rotation: Array) -> Arr
     return levers(moving, pivot, rotation) + (pivot + position)[..., None, :]
 
 
-def readings(struts: Array, zero: Array, arms: RotaryArms | None) -> Array:
+def readings(struts: Array, zero: Array, gain: Array, arms: RotaryArms | None) -> Array:
     """Readings (..., 6) of legs whose strut vectors are `struts` (..., 6, 3).
 
     Args:
         struts: from base joint to platform joint; for rotary legs from the arm's centre.
-        zero: (6,) length at which a leg reads 0: zeros, or the lengths at home.
-        arms: the motor arms of rotary legs, whose readings are angles [rad].
+        zero: (6,) length [platform unit] or motor angle [rad] at which a leg reads 0.
+        gain: (6,) by how much length or angle change for one unit of reading.
+        arms: the motor arms of rotary legs; motor angles minus `zero` are within half a turn.
     """
     if arms is not None:
-        return motor_angles(struts, arms)
-    return np.linalg.norm(struts, axis=-1) - zero
+        angle = motor_angles(struts, arms) - zero
+        return np.arctan2(np.sin(angle), np.cos(angle)) / gain
+    return (np.linalg.norm(struts, axis=-1) - zero) / gain
 
 
 def equivalent(
-    base: Array, zero: Array, arms: RotaryArms | None, legs: Array
+    base: Array, zero: Array, gain: Array, arms: RotaryArms | None, legs: Array
 ) -> tuple[Array, Array]:
     """Telescopic struts that readings stand for: inverse of `readings`.
 
     Args:
         base: (6, 3) base joints, or centres of the arms.
-        zero: (6,) as in `readings`.
+        zero, gain: (6,) as in `readings`.
         legs: readings (..., 6).
 
     Returns:
         Lower ends (..., 6, 3) and lengths (..., 6) of the struts.
     """
+    true = gain * legs + zero
     if arms is not None:
-        tips = base + arms.arm_length * arm_directions(arms, legs)[0]
-        return tips, np.full(legs.shape, arms.rod_length)
-    return np.broadcast_to(base, (*legs.shape, 3)), legs + zero
+        tips = base + arms.arm_length[:, None] * arm_directions(arms, true)[0]
+        return tips, np.broadcast_to(arms.rod_length, legs.shape)
+    return np.broadcast_to(base, (*legs.shape, 3)), true
 
 
 def arm_directions(arms: RotaryArms, angles: Array) -> tuple[Array, Array]:
@@ -70,6 +79,8 @@ def arm_directions(arms: RotaryArms, angles: Array) -> tuple[Array, Array]:
 def motor_angles(struts: Array, arms: RotaryArms) -> Array:
     """Angles whose arm tips are one rod length from the platform joints, (..., 6) [rad].
 
+    They count from `axis_x` and are within three half turns of it.
+
     With (x, y) the joint in the arm's plane, h = |(x, y)|, D its distance from the centre:
     |joint - tip|^2 = rod^2 becomes 2 a h cos(q - atan2(y, x)) = D^2 + a^2 - rod^2. NaN where
     arm and rod cannot reach the joint.
@@ -81,18 +92,17 @@ def motor_angles(struts: Array, arms: RotaryArms) -> Array:
     reach = 2 * arms.arm_length * np.hypot(x, y)
     wanted = np.sum(struts**2, axis=-1) + arms.arm_length**2 - arms.rod_length**2
     with np.errstate(invalid="ignore", divide="ignore"):
-        angle = np.arctan2(y, x) + arms.branch * np.arccos(wanted / reach)
-    return np.arctan2(np.sin(angle), np.cos(angle))
+        return np.arctan2(y, x) + arms.branch * np.arccos(wanted / reach)
 
 
-def rods_and_rates(struts: Array, arms: RotaryArms | None) -> tuple[Array, Array]:
+def rods_and_rates(struts: Array, gain: Array, arms: RotaryArms | None) -> tuple[Array, Array]:
     """Struts or rods (..., 6, 3), and the divisors (..., 6) that give d reading / d twist.
 
     A telescopic reading changes by d . dP / |d|. A rotary one keeps |P - tip(q)|, so
-    d . (dP - tip'(q) dq) = 0 and dq = d . dP / (d . tip'(q)).
+    d . (dP - tip'(q) dq) = 0 and dq = d . dP / (d . tip'(q)). Either is divided by the gain.
     """
     if arms is None:
-        return struts, np.linalg.norm(struts, axis=-1)
+        return struts, gain * np.linalg.norm(struts, axis=-1)
     arm, slope = arm_directions(arms, motor_angles(struts, arms))
-    rods = struts - arms.arm_length * arm
-    return rods, arms.arm_length * np.sum(rods * slope, axis=-1)
+    rods = struts - arms.arm_length[:, None] * arm
+    return rods, gain * arms.arm_length * np.sum(rods * slope, axis=-1)

@@ -14,9 +14,9 @@ from gough.kernel.jit import jit
 from gough.kernel.layout import (
     COMPONENTS,
     COUNT,
+    GAIN,
     INSIDE,
     LENGTH,
-    OFFSET,
     OPEN,
     ORDER,
     PER_SIZE,
@@ -27,6 +27,7 @@ from gough.kernel.layout import (
     SQUARE,
     STEP,
     WIDTH,
+    ZERO,
 )
 from gough.kernel.polynomial import guess_block
 from gough.kernel.pose_io import give_pose, in_stroke, place, put_pose, take_reading
@@ -112,10 +113,10 @@ def _load_lengths(constants, readings, buffer):
     inverse = constants[PER_SIZE]
     good = 0
     for i in range(6):
-        leg, offset = int(constants[ORDER + i]), constants[OFFSET + i]
+        leg, gain, zero = int(constants[ORDER + i]), constants[GAIN + i], constants[ZERO + i]
         reading = readings[leg * WIDTH : (leg + 1) * WIDTH]
         for k in range(WIDTH):
-            length = (reading[k] + offset) * inverse
+            length = (gain * reading[k] + zero) * inverse
             buffer[(LENGTH + i) * WIDTH + k] = length
             buffer[(SQUARE + i) * WIDTH + k] = length * length
             good += 1 if (length > 0) & (length < np.inf) else 0

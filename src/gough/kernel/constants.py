@@ -43,16 +43,16 @@ def constants(platform: Platform, singular: float = SINGULAR) -> Array:
     put(layout.PIVOT, (platform.pivot_point - centre) / size)
     put(layout.ORIGIN, base_centre - platform.pivot_point)
     put(layout.REST, platform.home_legs)
+    put(layout.GAIN, platform.gain[order])
+    put(layout.ZERO, platform.true_at_zero[order])
     stroke = platform.stroke if platform.stroke is not None else np.tile([-np.inf, np.inf], (6, 1))
     put(layout.STROKE, stroke)
     if platform.rotary is not None:
         arms = platform.rotary
         c[layout.ROTARY] = 1.0
-        put(layout.ROD, arms.rod_length / size)
-        put(layout.ARM_X, arms.arm_length / size * arms.axis_x[order])
-        put(layout.ARM_Y, arms.arm_length / size * arms.axis_y[order])
-    elif platform.legs == "length_change":
-        put(layout.OFFSET, platform.home_lengths[order])
+        put(layout.ROD, arms.rod_length[order] / size)
+        put(layout.ARM_X, (arms.arm_length[:, None] / size * arms.axis_x)[order])
+        put(layout.ARM_Y, (arms.arm_length[:, None] / size * arms.axis_y)[order])
     _put_workspace(put, platform)
     put(layout.START, to_internal(c, platform.home))
     # sigma_min >= |det| ((n - 1) / |J|_F^2)^((n - 1) / 2) with n = 6 (Yu and Gu 1997), and

@@ -34,18 +34,19 @@ HOME = 33  # home quaternion: 4
 TURN = 37  # cos mid, sin mid, cos half width of each Euler angle's range: 3 x 3
 ORDER = 46  # which reading each leg in solving order has: 6
 FIXED = 52  # base joints from their centre (arm centres, for rotary legs): 6 x 3
-OFFSET = 70  # added to a reading to give a length [platform unit]: 6
-ROTARY = 76  # 1 for rotary legs, else 0
-ROD = 77  # rod length
-ARM_X = 78  # arm length times axis_x: 6 x 3
-ARM_Y = 96  # arm length times axis_y: 6 x 3
-SIZE = 114  # of the platform [platform unit]
-ORIGIN = 115  # centre of the base joints minus pivot [platform unit]: 3
-START = 118  # home in internal coordinates: position 3, quaternion 4
-REST = 125  # readings at home, as they come: 6
-STROKE = 131  # lowest and highest reading, as they come: 6 x 2
-PER_SIZE = 143  # 1 / SIZE, made once: compilers may turn x (1 / y) into x / y in one loop only
-CONSTANTS = 144
+GAIN = 70  # length or angle = gain times reading + zero; see `gough.struts`: 6
+ZERO = 76  # [platform unit], or [rad]: 6
+ROTARY = 82  # 1 for rotary legs, else 0
+ROD = 83  # rod lengths: 6
+ARM_X = 89  # arm length times axis_x: 6 x 3
+ARM_Y = 107  # arm length times axis_y: 6 x 3
+SIZE = 125  # of the platform [platform unit]
+ORIGIN = 126  # centre of the base joints minus pivot [platform unit]: 3
+START = 129  # home in internal coordinates: position 3, quaternion 4
+REST = 136  # readings at home, as they come: 6
+STROKE = 142  # lowest and highest reading, as they come: 6 x 2
+PER_SIZE = 154  # 1 / SIZE, made once: compilers may turn x (1 / y) into x / y in one loop only
+CONSTANTS = 155
 
 # Block verdicts from here on are not statuses: the row is still open.
 OPEN = 100

@@ -10,8 +10,8 @@ from gough.kernel.layout import (
     ARM_Y,
     BASE,
     FIXED,
+    GAIN,
     LENGTH,
-    OFFSET,
     ORDER,
     ORIGIN,
     PER_SIZE,
@@ -23,6 +23,7 @@ from gough.kernel.layout import (
     SIZE,
     SQUARE,
     STROKE,
+    ZERO,
 )
 
 
@@ -36,17 +37,18 @@ def take_reading(constants, legs, row, buffer, k, stride):
     valid = True
     for i in range(6):
         reading = legs[row, int(constants[ORDER + i])]
-        length = reading + constants[OFFSET + i]
+        length = constants[GAIN + i] * reading + constants[ZERO + i]
         # by comparison, since Numba's isfinite is x - x == 0, which fast-math folds to True
         valid &= (np.abs(length) < np.inf) & ((length > 0) | (constants[ROTARY] == 1))
     for i in range(6):
         leg = int(constants[ORDER + i])
         reading = legs[row, leg] if valid else constants[REST + leg]
-        length = (reading + constants[OFFSET + i]) * constants[PER_SIZE]
+        true = constants[GAIN + i] * reading + constants[ZERO + i]
+        length = true * constants[PER_SIZE]
         cosine, sine = 0.0, 0.0
         if constants[ROTARY] == 1:
-            length = constants[ROD]
-            cosine, sine = np.cos(reading), np.sin(reading)
+            length = constants[ROD + i]
+            cosine, sine = np.cos(true), np.sin(true)
         buffer[(LENGTH + i) * stride + k] = length
         buffer[(SQUARE + i) * stride + k] = length * length
         for axis in range(3):

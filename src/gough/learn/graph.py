@@ -67,8 +67,9 @@ def edge_lengths(platform: Platform, legs: Array) -> Array:
     plus the way that the arm's tip has gone, which tells the readings apart just as well.
     """
     if platform.rotary is not None:
-        return platform.home_lengths + platform.rotary.arm_length * (legs - platform.home_legs)
-    return legs + platform.home_lengths if platform.legs == "length_change" else legs
+        travel = platform.gain * (legs - platform.home_legs)
+        return platform.home_lengths + platform.rotary.arm_length * travel
+    return platform.gain * legs + platform.true_at_zero
 
 
 def _ring(points: Array) -> list[tuple[int, int]]:

@@ -23,6 +23,8 @@ class TorchPlatform(nn.Module):
     origin: Tensor
     home_rotation: Tensor
     home_lengths: Tensor
+    offset: Tensor
+    gain: Tensor
     axis_x: Tensor
     axis_y: Tensor
     branch: Tensor
@@ -40,6 +42,8 @@ class TorchPlatform(nn.Module):
             "origin": platform.home.position + platform.pivot_point,
             "home_rotation": platform.home.rotation,
             "home_lengths": platform.home_lengths,
+            "offset": platform.offset,
+            "gain": platform.gain,
         }
         if rotary is not None:
             facts |= {"axis_x": rotary.axis_x, "axis_y": rotary.axis_y, "branch": rotary.branch}
@@ -81,13 +85,21 @@ class TorchPlatform(nn.Module):
 
     def equivalent_struts(self, legs: Tensor) -> tuple[Tensor, Tensor]:
         """Where struts start (..., 6, 3) and their lengths (..., 6): see `gough.kinematics`."""
-        if self.platform.rotary is not None:
-            angle = legs[..., None]
-            tips = self.base + self.arm * (angle.cos() * self.axis_x + angle.sin() * self.axis_y)
-            return tips, self.rod.expand(legs.shape)
-        if self.platform.legs == "length_change":
-            legs = legs + self.home_lengths
-        return self.base.expand(*legs.shape, 3), legs
+        true = self.gain * legs + self._zero()
+        if self.platform.rotary is None:
+            return self.base.expand(*legs.shape, 3), true
+        return self._tips(true), self.rod.expand(legs.shape)
+
+    def _zero(self) -> Tensor:
+        """Length or motor angle of a leg that reads 0, (6,): see `Platform.true_at_zero`."""
+        change = self.platform.legs == "length_change"
+        return self.offset + self.home_lengths if change else self.offset
+
+    def _tips(self, angle: Tensor) -> Tensor:
+        """Tips (..., 6, 3) of motor arms at angles (..., 6)."""
+        angle = angle[..., None]
+        turned = angle.cos() * self.axis_x + angle.sin() * self.axis_y
+        return self.base + self.arm[:, None] * turned
 
     def strut_errors(self, position: Tensor, rotation: Tensor, starts: Tensor, lengths: Tensor
                      ) -> tuple[Tensor, Tensor]:  # fmt: skip
@@ -115,12 +127,10 @@ class TorchPlatform(nn.Module):
         return self._readings(self._struts_at(position, rotation)[0])
 
     def _readings(self, struts: Tensor) -> Tensor:
-        if self.platform.rotary is not None:
-            return self._motor_angles(struts)
-        lengths = torch.linalg.vector_norm(struts, dim=-1)
-        if self.platform.legs == "length_change":
-            return lengths - self.home_lengths
-        return lengths
+        if self.platform.rotary is None:
+            return (torch.linalg.vector_norm(struts, dim=-1) - self._zero()) / self.gain
+        angle = self._motor_angles(struts) - self.offset
+        return torch.atan2(torch.sin(angle), torch.cos(angle)) / self.gain
 
     def _struts_at(self, position: Tensor, rotation: Tensor) -> tuple[Tensor, Tensor]:
         """As `struts`, for poses in base coordinates."""
@@ -128,12 +138,11 @@ class TorchPlatform(nn.Module):
         return arms + (position + self.pivot)[..., None, :] - self.base, arms
 
     def _motor_angles(self, joint: Tensor) -> Tensor:
-        """See `gough.kinematics._motor_angles`."""
+        """See `gough.struts.motor_angles`."""
         x, y = (joint * self.axis_x).sum(-1), (joint * self.axis_y).sum(-1)
         reach = 2 * self.arm * torch.hypot(x, y)
         wanted = (joint**2).sum(-1) + self.arm**2 - self.rod**2
-        angle = torch.atan2(y, x) + self.branch * torch.acos(wanted / reach)
-        return torch.atan2(torch.sin(angle), torch.cos(angle))
+        return torch.atan2(y, x) + self.branch * torch.acos(wanted / reach)
 
     def assembly_sign(self, shift: Tensor, turn: Tensor) -> Tensor:
         """Sign of det J times that at home, (...): see `gough.assembly_sign`."""
@@ -145,8 +154,7 @@ class TorchPlatform(nn.Module):
         struts, arms = self.struts(shift, turn)
         rods = struts
         if self.platform.rotary is not None:
-            angle = self._motor_angles(struts)[..., None]
-            rods = struts - self.arm * (angle.cos() * self.axis_x + angle.sin() * self.axis_y)
+            rods = struts - (self._tips(self._motor_angles(struts)) - self.base)
         rows = torch.cat([rods, torch.linalg.cross(arms, rods)], dim=-1)  # (..., 6, 6)
         return torch.linalg.slogdet(rows / torch.linalg.vector_norm(rods, dim=-1, keepdim=True))[0]
 

@@ -153,7 +153,7 @@ def _angle(a: Array, b: Array) -> Array:
 
 def _on_branch(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.bool_]:
     """Whether the motors' own branch of the inverse kinematics gives the readings back."""
-    gap = leg_lengths(platform, pose) - readings
+    gap = platform.gain * (leg_lengths(platform, pose) - readings)
     wrapped = np.abs(np.arctan2(np.sin(gap), np.cos(gap)))
     return np.all(wrapped < BRANCH_SLACK, axis=-1)
 

@@ -138,9 +138,10 @@ def _family(platform: Platform, frames: Frames, spread: float) -> Corner:
     arms = platform.rotary
     typical = (arms.rod_length / frames.scale) ** 2
     centre = frames.base(platform.base)
-    tips = [frames.base(platform.base + arms.arm_length * a) for a in (arms.axis_x, arms.axis_y)]
-
-    cos, sin = np.cos(platform.home_legs)[:, None], np.sin(platform.home_legs)[:, None]
+    reach = arms.arm_length[:, None]
+    tips = [frames.base(platform.base + reach * a) for a in (arms.axis_x, arms.axis_y)]
+    angles = (platform.gain * platform.home_legs + platform.true_at_zero)[:, None]
+    cos, sin = np.cos(angles), np.sin(angles)
 
     def draw(rng: np.random.Generator) -> tuple[Complex, Complex]:
         # arms of complex direction and length: a linear family that holds all readings
