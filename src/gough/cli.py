@@ -1,8 +1,9 @@
-"""The command line: find the command, parse its options, turn errors into one line."""
+"""The command line: find the command, parse its options, print errors as one line."""
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from contextlib import suppress
@@ -21,59 +22,59 @@ EXTRAS = {"matplotlib": "plot", "viser": "view"} | dict.fromkeys(
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit.
 
-    Exit codes: 0 all rows have a usable answer; 1 some have not; 2 bad usage, unreadable input
-    or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 told to terminate.
+    Exit codes: 0 all rows have a usable result; 1 some have not; 2 bad usage, unreadable input
+    or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 asked to terminate.
     """
     given = sys.argv[1:] if arguments is None else arguments
     signals.listen()
-    code = _guarded(given)
+    code = _run(given)
     signals.ignore()
     sys.exit(code)
 
 
-def _guarded(arguments: list[str]) -> int:
-    """The exit code of a command, whatever happens in it."""
+def _run(arguments: list[str]) -> int:
+    """Run a command and return its exit code, also after an error."""
     name = " ".join(["gough", *[a for a in arguments[:1] if a in COMMANDS]])
     try:
-        code = _dispatch(arguments)
+        code = _call_command(arguments)
         sys.stdout.flush()
         return code
     except GoughError as error:
-        return _complain(f"{name}: error: {error}")
+        return _print_error(f"{name}: error: {error}")
     except signals.Stopped as stop:
         return _stopped(name, stop.number)
     except BrokenPipeError:
         _drop_output()
         return BROKEN_PIPE
     except MemoryError:
-        return _complain(f"{name}: error: not enough memory; pass a smaller --block-rows")
+        return _print_error(f"{name}: error: not enough memory; pass a smaller --block-rows")
     except OSError as error:
         _drop_output()
         where = f"{error.filename}: " if error.filename else ""
-        return _complain(f"{name}: error: {where}{error.strerror or error}")
+        return _print_error(f"{name}: error: {where}{error.strerror or error}")
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         extra = EXTRAS.get(package)
         if extra is None:
             raise
-        return _complain(
+        return _print_error(
             f"{name}: error: needs {package}, which is not installed; install it with: "
             f"pip install 'gough[{extra}]', or in a clone: pip install -e '.[{extra}]'"
         )
     except Exception:
-        number = signals.asked()
+        number = signals.requested()
         if number is None:
             raise
-        return _stopped(name, number)  # a library made another error of it
+        return _stopped(name, number)  # a library turned `Stopped` into another error
 
 
 def _stopped(name: str, number: int) -> int:
     how = "interrupted" if number == signal.SIGINT else "terminated"
-    _complain(f"{name}: {how}; no file was changed")
+    _print_error(f"{name}: {how}; no file was changed")
     return 128 + number
 
 
-def _dispatch(arguments: list[str]) -> int:
+def _call_command(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(_help(), file=sys.stdout if arguments else sys.stderr)
         return 0 if arguments else BAD_USAGE
@@ -88,6 +89,9 @@ def _dispatch(arguments: list[str]) -> int:
 
     module, function, _ = COMMANDS[command]
     run = getattr(import_module(module), function)
+    for each in run.values() if isinstance(run, dict) else [run]:
+        # one line for each option's help, which tyro wraps to the width of the screen
+        each.__doc__ = re.sub(r"\n {12}", " ", each.__doc__ or "")
     # flags are --flag alone, without a --no-flag beside it
     config = (tyro.conf.FlagCreatePairsOff,)
     if isinstance(run, dict):  # a family of commands, by name
@@ -103,25 +107,25 @@ def _help() -> str:
         [
             "usage: gough COMMAND [OPTIONS]",
             "",
-            "Where a hexapod is: its poses from the lengths of its legs, and back.",
+            "Forward kinematics of hexapods: poses from the lengths of their legs, and back.",
             "",
             "commands:",
             *lines,
             "",
-            "gough COMMAND --help tells more; gough --version prints the version.",
+            "gough COMMAND --help lists the options; gough --version prints the version.",
         ]
     )
 
 
-def _complain(text: str) -> int:
-    """One line on stderr, which may be gone too."""
+def _print_error(text: str) -> int:
+    """Print one line on standard error, which may be closed, and return the exit code."""
     with suppress(OSError):
         print(text, file=sys.stderr, flush=True)
     return BAD_USAGE
 
 
 def _drop_output() -> None:
-    """Send what Python still holds for standard output to nowhere, so that exit is silent."""
+    """Discard what is buffered for standard output, so that the exit is silent."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, sys.stdout.fileno())
     os.close(null)

@@ -1,4 +1,4 @@
-"""Names of the columns of files and tables, and which of those found are meant."""
+"""Names of the columns of files and tables, and the choice among those found."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     """The six leg columns of a file whose columns are `found`.
 
     Raises:
-        InputError: some are missing or occur twice; the text lists what there is.
+        InputError: some are missing or occur twice; the message lists those found.
     """
     missing = [name for name in LEGS if name not in found]
     if missing:
@@ -35,10 +35,10 @@ def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
 
 
 def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
-    """Position and rotation columns, the first of qw.., rx.., rx_deg.. that is there whole.
+    """Position and rotation columns: the first complete set of qw.., rx.., rx_deg.. columns.
 
     Raises:
-        InputError: some are missing or occur twice; the text lists what there is.
+        InputError: some are missing or occur twice; the message lists those found.
     """
     missing = [name for name in POSITION if name not in found]
     rotation = next((r for r in ROTATIONS if all(name in found for name in r)), None)
@@ -55,7 +55,7 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     """The columns of a pose, or LEGS of a file that holds none.
 
     Raises:
-        InputError: some are missing or occur twice; the text lists what there is.
+        InputError: some are missing or occur twice; the message lists those found.
     """
     has_legs = any(name in found for name in LEGS)
     if not has_legs and not any(name in found for name in POSITION):
@@ -73,7 +73,7 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
 
 
 def pose_names(angles: Angles | None) -> tuple[str, ...]:
-    """The columns that a pose is written to: with Euler angles in these units, or a quaternion.
+    """The columns of a written pose: with Euler angles in these units, or with a quaternion.
 
     Raises:
         GoughError: angles of another name.
@@ -84,13 +84,13 @@ def pose_names(angles: Angles | None) -> tuple[str, ...]:
 
 
 def solution_names(angles: Angles | None, covariance: bool, radius: bool) -> tuple[str, ...]:
-    """The columns that solved rows are written to."""
+    """The columns of solved rows in files and tables."""
     optional = DEVIATIONS * covariance + (RADIUS,) * radius
     return (*pose_names(angles), STATUS, RESIDUAL, ITERATIONS, *optional)
 
 
 def checked(where: str, found: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
-    """`wanted`, each of which is in `found` exactly once.
+    """Return `wanted` if each of its names is in `found` exactly once.
 
     Raises:
         InputError: naming the column that is missing or occurs twice.
@@ -105,7 +105,7 @@ def checked(where: str, found: Sequence[str], wanted: Sequence[str]) -> tuple[st
 
 
 def check_kept(keep: Sequence[str], written: Sequence[str]) -> None:
-    """Kept columns must not carry the name of a column that is written.
+    """Raise if a kept column has the name of a column that is written.
 
     Raises:
         InputError: naming the column.
@@ -118,7 +118,7 @@ def check_kept(keep: Sequence[str], written: Sequence[str]) -> None:
 
 
 def _rename(missing: Sequence[str], found: Sequence[str]) -> str:
-    """What to do about missing columns; names the one most like the first of them, if any is."""
+    """The advice for missing columns; it names the one most like the first of them."""
     from difflib import get_close_matches
 
     known = {name for names in (LEGS, POSITION, *ROTATIONS) for name in names}

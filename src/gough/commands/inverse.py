@@ -31,7 +31,7 @@ def run(
     head: Head = 5,
     block_rows: BlockRows = 65536,
 ) -> int:
-    """Leg readings from a file of poses.
+    """Calculate leg readings from a file of poses.
 
     gough inverse poses.csv -p rubin_camera -o legs.parquet
 
@@ -39,10 +39,10 @@ def run(
 
     qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz).
 
-    Exit code 0: all rows have legs; 1: some have not; 2: nothing was written.
+    Exit code 0: all rows have readings; 1: some have none; 2: nothing was written.
 
     Args:
-        poses: .csv or .parquet with these columns, or - for CSV on standard input.
+        poses: Read this .csv or .parquet file with these columns, or CSV from standard input (-).
     """
     from gough.commands import show
     from gough.files import inverse_file
@@ -54,9 +54,4 @@ def run(
             poses, out, machine, progress=progress, head=0 if out else head,
             reading=reading_options(keep, keep_bad_rows, ignore_platform, block_rows),
         )  # fmt: skip
-    screen = show.console_beside(out)
-    if not out and head:
-        show.print_legs(report, machine, screen)
-    show.print_invalid(report, poses)
-    show.print_summary(report, machine, out, screen)
-    return 1 if report.failures and not allow_failures else 0
+    return show.print_report(report, machine, poses, out, head, show.print_legs, allow_failures)

@@ -1,4 +1,4 @@
-"""gough platforms: what the catalog holds."""
+"""gough platforms: the machines of the catalog."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def run(name: Annotated[Positional[str], arg(metavar="[NAME]", help_behavior_hin
     gough platforms rubin_camera > mine.toml
 
     Args:
-        name: a machine of the catalog, or the path of a .toml file to check.
+        name: Print this machine of the catalog, or check this .toml file.
     """
     from gough.platform import Platform
     from gough.platform_file import catalog_names, catalog_text

@@ -11,7 +11,6 @@ from tyro.conf import Positional, arg
 
 from gough.commands.modes import Legs, readings, six_numbers
 from gough.commands.options import BlockRows, IgnorePlatform, KeepBadRows, PlatformName
-from gough.commands.solve import default_seed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -135,7 +134,7 @@ def trajectory(
     platform: PlatformName,
     time: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None,
     out: Picture = None,
-    seed: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    seed: Annotated[str, arg(metavar="NAME")] = "auto",
     keep_bad_rows: KeepBadRows = False,
     ignore_platform: IgnorePlatform = False,
     block_rows: BlockRows = 65536,
@@ -161,9 +160,7 @@ def trajectory(
     machine = _machine(platform, out, "trajectory")
     reading = reading_options("", keep_bad_rows, ignore_platform, block_rows)
     with _ticking() as tick:
-        envelope = read_trajectory(
-            file, machine, time=time, seed=seed or default_seed(machine), reading=reading, tick=tick
-        )
+        envelope = read_trajectory(file, machine, time=time, seed=seed, reading=reading, tick=tick)
     figure = trajectory_figure(machine, envelope, time=time or "row",
                                title=f"{machine.name}: {_name(file)}")  # fmt: skip
     code = _save(figure, machine, out, "trajectory")
@@ -247,13 +244,13 @@ def _pose(
         if given:
             raise InputError("POSE, --legs: pass one of them, not both")
         values = six_numbers("--legs", legs, "readings")
-        solution = solve(machine, values, seed=default_seed(machine))
+        solution = solve(machine, values)
         print(f"{solution.status.label}: {solution.status.text}")
         return solution.pose
     if not given:
         return machine.home
     if len(given) == 1 and (given[0] == "-" or given[0].lower().endswith((".csv", ".parquet"))):
-        return read_pose(given[0], machine, row, default_seed(machine))
+        return read_pose(given[0], machine, row)
     values = six_numbers("POSE", given, "numbers x y z rx ry rz, or a .csv or .parquet file")
     if not np.all(np.isfinite(values)):
         raise InputError(f"POSE: expected six finite numbers, found {' '.join(given)}")

@@ -1,9 +1,9 @@
-"""Tables, summaries and the progress bar."""
+"""Tables, summaries and the progress bar of the commands."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -20,24 +20,24 @@ if TYPE_CHECKING:
     from gough.files.rows import Source
     from gough.platform import Platform
 
-NOTICED = 2.0  # [s] of compiling that deserve a word
-STANDARD = "-"  # as in gough.files, which is too heavy to import for a help text
+NOTICEABLE = 2.0  # [s] of compiling that are reported
+STANDARD = "-"  # as in gough.files, whose import takes too long for a help text
 # one rule, below the head
 RULE = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 
 
 def console(*, errors: bool = False) -> Console:
-    """Plain text on standard output or standard error; numbers are not coloured."""
+    """A console for plain text on standard output or standard error; numbers are not coloured."""
     return Console(stderr=errors, highlight=False, soft_wrap=False)
 
 
 def console_beside(out: str | None) -> Console:
-    """Where to print when results go to `out`: standard error if they take standard output."""
+    """The console to print on: standard error if `out` is standard output, else that."""
     return console(errors=out == STANDARD)
 
 
 def plain_table(*heads: str) -> Table:
-    """A table with a rule below its head; a head that starts with > is set to the right."""
+    """A table with a rule below its head; a column whose head starts with > is set to the right."""
     table = Table(box=RULE, pad_edge=False, padding=(0, 1, 0, 0), header_style="", show_edge=False)
     for head in heads:
         side = "right" if head.startswith(">") else "left"
@@ -45,15 +45,37 @@ def plain_table(*heads: str) -> Table:
     return table
 
 
+def print_report(
+    report: Report,
+    platform: Platform,
+    path: str,
+    out: str | None,
+    head: int,
+    print_rows: Callable[[Report, Platform, Console], None],
+    allow_failures: bool,
+) -> int:
+    """Print the first rows unless a file was written, invalid rows and the summary.
+
+    Returns:
+        The exit code: 1 if a row has no usable result and `allow_failures` is False, else 0.
+    """
+    screen = console_beside(out)
+    if not out and head:
+        print_rows(report, platform, screen)
+    print_invalid(report, path)
+    print_summary(report, platform, out, screen)
+    return 1 if report.failures and not allow_failures else 0
+
+
 def print_summary(report: Report, platform: Platform, out: str | None, screen: Console) -> None:
-    """Rows by status with shares, worst residuals and what each status means."""
+    """Print rows by status with shares and largest residuals, and the text of each status."""
     target = "" if out is None else f", written to {'standard output' if out == STANDARD else out}"
     rate = report.rows / max(report.seconds, 1e-9)
     screen.print(
         f"{report.rows:,} rows in {report.seconds:.3g} s ({rate:,.0f} rows/s){target}",
         markup=False,
     )
-    if report.preparing > NOTICED:
+    if report.preparing > NOTICEABLE:
         screen.print(f"(before that {report.preparing:.0f} s to compile the solver, once)")
     residuals = not np.all(np.isnan(report.worst))
     heads = ["status", ">rows", ">share"] + ["worst residual"] * residuals
@@ -70,7 +92,7 @@ def print_summary(report: Report, platform: Platform, out: str | None, screen: C
 
 
 def _share(report: Report, i: int) -> str:
-    """A percentage that says 100 or 0 only where that is exact."""
+    """A percentage that is shown as 100 or 0 only where that is exact."""
     share = 100 * report.counts[i] / report.rows
     if 99.95 <= share < 100:
         return "> 99.9 %"
@@ -78,7 +100,7 @@ def _share(report: Report, i: int) -> str:
 
 
 def print_invalid(report: Report, where: str) -> None:
-    """The first invalid rows and how many more there are, on standard error."""
+    """Print the first invalid rows and the number of others, on standard error."""
     screen = console(errors=True)
     for text in report.invalid:
         screen.print(f"{where}: {text}", markup=False, soft_wrap=True)
@@ -93,7 +115,7 @@ def print_invalid(report: Report, where: str) -> None:
 
 
 def print_poses(report: Report, platform: Platform, screen: Console) -> None:
-    """The first poses, angles in degrees."""
+    """Print the first poses, angles in degrees."""
     unit = f" [{platform.unit}]".replace("[", r"\[") if platform.unit else ""
     heads = [f">{name}{unit}" for name in ("x", "y", "z")]
     table = plain_table(*heads, ">rx_deg", ">ry_deg", ">rz_deg", "status")
@@ -107,7 +129,7 @@ def print_poses(report: Report, platform: Platform, screen: Console) -> None:
 
 
 def print_legs(report: Report, platform: Platform, screen: Console) -> None:
-    """The first leg readings."""
+    """Print the first leg readings."""
     table = plain_table(*(f">leg_{i}" for i in range(1, 7)), "status")
     places = 6 if platform.legs == "rotary" else _decimals(platform.size)
     for i, status in enumerate(report.status):
@@ -117,13 +139,13 @@ def print_legs(report: Report, platform: Platform, screen: Console) -> None:
 
 
 def _decimals(size: float) -> int:
-    """Decimals that show a ten-millionth of a length: seven for a platform of a metre."""
+    """Number of decimals that show a ten-millionth of a length: seven for a metre."""
     return int(np.clip(7 - np.floor(np.log10(size)), 0, 12))
 
 
 @contextmanager
 def progress_bar() -> Iterator[Tick]:
-    """What to call after every block of rows.
+    """Yield a function to call after every block of rows.
 
     It draws a bar with rate and remaining time on standard error, if that is a terminal, and
     ends the command if a signal has asked for it.

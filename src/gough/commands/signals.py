@@ -1,8 +1,7 @@
-"""Ctrl-C and requests to terminate: never lost, and never in the way of tidying up.
+"""Ctrl-C and requests to terminate: none is lost, and none interrupts the removal of files.
 
-An exception that a signal handler raises can be swallowed: libraries that import others when
-first used catch whatever goes wrong there. So the request is also noted, and commands that run
-long ask for it after every block of rows.
+Libraries that import others when first used may swallow an exception raised by a signal handler.
+So the request is also recorded, and commands that run long call `check` after every block of rows.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ import time
 from types import FrameType
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-TIDYING = 2.0  # seconds in which more signals do not interrupt the removal of unfinished files
+CLEANUP = 2.0  # [s] in which further signals do not interrupt the removal of unfinished files
 
-_asked: int | None = None
+_requested: int | None = None
 _since = 0.0
 
 
@@ -27,35 +26,35 @@ class Stopped(BaseException):
 
 
 def listen() -> None:
-    """Turn the signals that ask a process to end into `Stopped`; ignored ones stay ignored."""
+    """Make the signals that end a process raise `Stopped`; ignored ones stay ignored."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _note)
+            signal.signal(number, _record)
 
 
 def ignore() -> None:
-    """The work is over, one way or the other: let nothing change the exit code any more."""
+    """Ignore further signals once the work is over, so that none changes the exit code."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) == _note:
+        if number is not None and signal.getsignal(number) == _record:
             signal.signal(number, signal.SIG_IGN)
 
 
-def asked() -> int | None:
-    """The signal that asked for the end, if one did."""
-    return _asked
+def requested() -> int | None:
+    """The signal that asked the process to end, if one did."""
+    return _requested
 
 
 def check() -> None:
-    """Raise `Stopped` if a signal has asked for it."""
-    if _asked is not None:
-        raise Stopped(_asked)
+    """Raise `Stopped` if a signal has asked the process to end."""
+    if _requested is not None:
+        raise Stopped(_requested)
 
 
-def _note(number: int, frame: FrameType | None) -> None:
-    global _asked, _since
-    first = _asked is None or time.monotonic() - _since > TIDYING
-    _asked, _since = number, time.monotonic() if first else _since
+def _record(number: int, frame: FrameType | None) -> None:
+    global _requested, _since
+    first = _requested is None or time.monotonic() - _since > CLEANUP
+    _requested, _since = number, time.monotonic() if first else _since
     if first:
         raise Stopped(number)

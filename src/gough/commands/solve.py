@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
@@ -15,13 +15,9 @@ from gough.commands.options import (
     KeepBadRows,
     Out,
     PlatformName,
+    option,
     reading_options,
 )
-
-if TYPE_CHECKING:
-    from gough.platform import Platform
-
-PREFERRED = "disgnet"
 
 
 def run(
@@ -29,13 +25,12 @@ def run(
     *,
     platform: PlatformName,
     out: Out = None,
-    seed: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
-    tolerance: Annotated[float | None, arg(metavar="T", help_behavior_hint="")] = None,
-    max_iterations: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    leg_noise: Annotated[float | None, arg(metavar="S", help_behavior_hint="")] = None,
-    angles: Annotated[
-        Literal["deg", "rad"] | None, arg(metavar="deg|rad", help_behavior_hint="")
-    ] = None,
+    seed: Annotated[str, arg(metavar="NAME")] = "auto",
+    tolerance: Annotated[float, arg(metavar="T")] = 1e-12,
+    max_iterations: Annotated[int, arg(metavar="N")] = 60,
+    workers: Annotated[int | None, option(metavar="N")] = None,
+    leg_noise: Annotated[float | None, option(metavar="S")] = None,
+    angles: Annotated[Literal["deg", "rad"] | None, option(metavar="deg|rad")] = None,
     keep: Keep = "",
     keep_bad_rows: KeepBadRows = False,
     allow_failures: AllowFailures = False,
@@ -43,7 +38,7 @@ def run(
     head: Head = 5,
     block_rows: BlockRows = 65536,
 ) -> int:
-    """Poses from a file of leg readings.
+    """Calculate poses from a file of leg readings.
 
     gough solve legs.parquet -p rubin_camera -o poses.parquet
 
@@ -52,44 +47,30 @@ def run(
     Exit code 0: all poses are usable; 1: some are not; 2: nothing was written.
 
     Args:
-        legs: .csv or .parquet with columns leg_1 to leg_6, or - for CSV on standard input.
-        seed: the first guess: home, polynomial, polynomial-5, the name of a network that comes
-            with gough, or the folder of a trained one. Without it: the network that comes with
-            gough for this platform (reference: disgnet); if none does, polynomial where the
-            platform states a workspace, else home.
-        tolerance: largest leg error of a converged row, as a share of the platform's size.
-        max_iterations: Newton steps before a row is given up; 0 writes the first guess.
-        leg_noise: standard deviation of the readings, in their unit; adds six columns with
-            those of the pose.
-        angles: write Euler angles, R = Rx Ry Rz, in place of quaternions.
+        legs: Read this .csv or .parquet file with columns leg_1 to leg_6, or CSV from standard
+            input (-).
+        seed: Start from this first guess: home, polynomial, polynomial-5 (another degree), the
+            name of a network that comes with gough, or the folder of a trained one. auto is
+            polynomial where the platform states a workspace, else home.
+        tolerance: Accept a row when its largest leg error is below this share of the platform's
+            size.
+        max_iterations: Take at most this many Newton steps from each start; 0 writes the first
+            guess.
+        workers: Use this many threads; without it all cores.
+        leg_noise: Add the standard deviations of the pose that readings with this standard
+            deviation (in their unit) cause.
+        angles: Write Euler angles, R = Rx Ry Rz, instead of quaternions.
     """
     from gough.commands import show
     from gough.files import solve_file
     from gough.platform import Platform
 
     machine = Platform.load(platform)
-    solver = {
-        "seed": seed or default_seed(machine),
-        "tol": tolerance,
-        "max_iterations": max_iterations,
-    }
-    given = {name: value for name, value in solver.items() if value is not None}
     with show.progress_bar() as progress:
         report = solve_file(
             legs, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
             reading=reading_options(keep, keep_bad_rows, ignore_platform, block_rows),
-            head=0 if out else head, **given,
+            head=0 if out else head, seed=seed, tol=tolerance, max_iterations=max_iterations,
+            workers=workers,
         )  # fmt: skip
-    screen = show.console_beside(out)
-    if not out and head:
-        show.print_poses(report, machine, screen)
-    show.print_invalid(report, legs)
-    show.print_summary(report, machine, out, screen)
-    return 1 if report.failures and not allow_failures else 0
-
-
-def default_seed(machine: Platform) -> str:
-    """The network that comes with the package for a machine, or what `solve` takes by itself."""
-    from gough.seeds.network import shipped_names
-
-    return PREFERRED if PREFERRED in shipped_names(machine) else "auto"
+    return show.print_report(report, machine, legs, out, head, show.print_poses, allow_failures)
