@@ -1,7 +1,9 @@
 # make solve   install the light core into .venv, solve a real machine's leg lengths
-# make test    install what the tests need as well, run them
+# make test    install what the tests need as well, run them all
+# make quick   the tests that need no PyTorch, browser or new process, few random samples: a minute
 # make pictures   the documents' pictures, by the commands that stand beside them
 # make lint    ruff, pyright, layers    make docs    HTML into docs/_build    make bench    the tables
+# make release-check   build sdist and wheel, install the wheel into an empty environment, use it
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.14 python3.13 python3.12 python3.11,\
   $(shell $(p) -c 'import sys; sys.version_info >= (3, 11) and print("$(p)")' 2>/dev/null)))
@@ -9,13 +11,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --disable-pip-version-check --quiet
 
-.PHONY: solve test lint docs pictures bench clean
+.PHONY: solve test quick lint docs pictures bench release-check clean
 
 solve: $(VENV)/.core
 	$(BIN)/gough solve examples/rubin_camera_legs.csv -p rubin_camera
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
+
+quick: $(VENV)/.dev
+	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n auto -q -m "not (slow or torch or browser or process)"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -33,6 +38,10 @@ pictures: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+release-check: $(BIN)/python
+	@$(PIP) 'build==1.6.1' 'twine==7.0.0'
+	$(BIN)/python tools/release_check.py
 
 clean:
 	rm -rf docs/_build build .pytest_cache .ruff_cache .hypothesis .benchmarks

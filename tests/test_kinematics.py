@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import machines
 import mujoco_model
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import support
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
-from support import BATCHES, TELESCOPIC_LIKE, Floats
+from support import BATCHES, TELESCOPIC_LIKE, Floats, reading_scale, unitless
 
 import gough
 from gough import GoughError, Platform, Pose, jacobian, leg_lengths, singularity_distance
@@ -21,17 +22,6 @@ CATALOG = Platform.catalog()
 REFERENCE = Platform.load("reference")
 REACHY = Platform.load("reachy_mini")
 NOWHERE = Pose(np.full(3, np.nan), np.full(4, np.nan))
-
-
-def reading_scale(platform: Platform) -> float:
-    """What a rounding error of a reading is relative to."""
-    return 1.0 if platform.legs == "rotary" else platform.size
-
-
-def unitless(platform: Platform, J: Floats) -> Floats:
-    """The Jacobian with readings and shifts counted in platform sizes."""
-    columns = np.array([platform.size] * 3 + [1.0] * 3)
-    return J * columns / reading_scale(platform)
 
 
 # ---- known cases ----------------------------------------------------------------------
@@ -170,7 +160,7 @@ def test_struts_are_mujocos_tendons(name: str) -> None:
 
 @given(st.integers(0, 10**6), st.sampled_from(["telescopic", "length_change"]))
 def test_struts_of_any_platform_are_mujocos_tendons(seed: int, legs: str) -> None:
-    platform = support.random_platform(seed, legs)
+    platform = machines.random_platform(seed, legs)
     pose = support.sample(platform, (), seed)
     lengths, rows = mujoco_model.measure(platform, pose)
     np.testing.assert_allclose(
@@ -198,7 +188,7 @@ def test_motor_angles_make_mujocos_rods_the_right_length() -> None:
 
 @given(support.seeds)
 def test_an_arms_tip_is_one_rod_from_the_joint(seed: int) -> None:
-    platform = support.random_platform(seed, "rotary", seed % 2 == 1)
+    platform = machines.random_platform(seed, "rotary", seed % 2 == 1)
     assert platform.rotary is not None
     poses = support.sample(platform, (10,), seed)
     readings = leg_lengths(platform, poses)
@@ -216,7 +206,7 @@ def test_an_arms_tip_is_one_rod_from_the_joint(seed: int) -> None:
 @given(support.seeds)
 def test_the_other_branch_is_the_other_angle_that_reaches(seed: int) -> None:
     """Both angles reach; they lie to the two sides of the joint's direction in the arm's plane."""
-    platform = support.random_platform(seed, "rotary")
+    platform = machines.random_platform(seed, "rotary")
     arms = platform.rotary
     assert arms is not None
     pose = support.sample(platform, (), seed)
@@ -266,108 +256,6 @@ def test_equivalent_struts_have_the_machines_geometry(
     assert lengths.shape == (*batch, 6)
     spans = np.linalg.norm(gough.joint_positions(platform, poses) - starts, axis=-1)
     np.testing.assert_allclose(spans, lengths, rtol=1e-13)
-
-
-# ---- invariances ----------------------------------------------------------------------
-
-
-@given(support.random_platforms, support.seeds, support.angles)
-def test_moving_the_base_frame_changes_no_reading(
-    platform: Platform, seed: int, angle: float
-) -> None:
-    """The whole machine, carried elsewhere: same readings, same conditioning."""
-    rng = np.random.default_rng(seed)
-    motion = support.random_poses(rng, (), angle)
-    motion = Pose(platform.size * motion.position, motion.wxyz)
-    platform = replace(platform, pivot=None)
-    carried = _carried(platform, motion)
-    poses = support.sample(platform, (5,), seed)
-    there = motion @ poses
-    _assert_same_machine(platform, poses, carried, there)
-
-
-def _carried(platform: Platform, motion: Pose) -> Platform:
-    arms = platform.rotary
-    if arms is not None:
-        R = motion.rotation.T
-        arms = replace(arms, axis_x=arms.axis_x @ R, axis_y=arms.axis_y @ R)
-    base, home = motion.apply(platform.base), motion @ platform.home
-    return replace(platform, base=base, home=home, rotary=arms, stroke=None)
-
-
-@given(support.random_platforms, support.seeds)
-def test_the_order_of_legs_only_orders_the_readings(platform: Platform, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(6)
-    shuffled = support.permuted(platform, order)
-    poses = support.sample(platform, (5,), seed)
-    atol = 1e-14 * reading_scale(platform)
-    np.testing.assert_allclose(
-        leg_lengths(shuffled, poses), leg_lengths(platform, poses)[:, order], rtol=0, atol=atol
-    )
-    np.testing.assert_allclose(
-        jacobian(shuffled, poses), jacobian(platform, poses)[:, order], rtol=1e-12, atol=1e-12
-    )
-    np.testing.assert_allclose(
-        singularity_distance(shuffled, poses), singularity_distance(platform, poses), rtol=1e-11
-    )
-
-
-UNITS = {"mm": 1e3, "inch": 1 / 0.0254, "km": 1e-3, "astronomical": 1e-20, "nuclear": 1e20}
-
-
-@pytest.mark.parametrize("name", CATALOG)
-@pytest.mark.parametrize("unit", UNITS)
-def test_the_unit_changes_no_digit_beyond_rounding(name: str, unit: str) -> None:
-    platform, factor = Platform.load(name), UNITS[unit]
-    other = support.scaled(platform, factor, unit)
-    poses = support.sample(platform, (30,))
-    there = Pose(factor * poses.position, poses.wxyz)
-    assert np.all(other.in_workspace(there))
-    assert other.workspace is not None
-    corner = other.home.position + other.workspace.translation[:, 1]
-    assert other.in_workspace(Pose(corner, other.home.wxyz))
-    assert not other.in_workspace(Pose(corner + 1e-7 * other.size, other.home.wxyz))
-    stretch = 1.0 if platform.legs == "rotary" else factor
-    np.testing.assert_allclose(
-        leg_lengths(other, there) / stretch, leg_lengths(platform, poses), rtol=0,
-        atol=2e-13 * reading_scale(platform),
-    )  # fmt: skip
-    np.testing.assert_allclose(
-        unitless(other, jacobian(other, there)), unitless(platform, jacobian(platform, poses)),
-        rtol=1e-9, atol=1e-12,
-    )  # fmt: skip
-    np.testing.assert_allclose(
-        singularity_distance(other, there), singularity_distance(platform, poses), rtol=1e-12
-    )
-    np.testing.assert_allclose(other.size, factor * platform.size, rtol=1e-14)
-
-
-@given(support.seeds)
-def test_pivot_and_tool_point_change_no_conditioning(seed: int) -> None:
-    """The same physical pose, told about another point: same distance to singularity."""
-    rng = np.random.default_rng(seed)
-    plain = replace(support.random_platform(seed), pivot=None)
-    point = plain.size * rng.standard_normal(3)
-    poses = support.sample(plain, (5,), seed)
-    tool = plain.with_origin_at(point)
-    _assert_same_machine(plain, poses, tool, Pose(poses.apply(point), poses.wxyz))
-    pivoted = replace(plain, pivot=point, home=_about(plain.home, point))
-    _assert_same_machine(plain, poses, pivoted, _about(poses, point))
-
-
-def _about(pose: Pose, point: Floats) -> Pose:
-    """The same motion p -> R p + t written as R (p - c) + c + t' with pivot c."""
-    return Pose(pose.apply(point) - point, pose.wxyz)
-
-
-def _assert_same_machine(a: Platform, pose_a: Pose, b: Platform, pose_b: Pose) -> None:
-    atol = 2e-13 * reading_scale(a)
-    np.testing.assert_allclose(leg_lengths(a, pose_a), leg_lengths(b, pose_b), rtol=0, atol=atol)
-    np.testing.assert_allclose(
-        singularity_distance(a, pose_a), singularity_distance(b, pose_b), rtol=1e-10
-    )
-    np.testing.assert_array_equal(gough.assembly_sign(a, pose_a), gough.assembly_sign(b, pose_b))
 
 
 # ---- distance to singularity, assembly sign -------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import machines
 import mujoco_model
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ def _plain(platform: Platform) -> Platform:
 @given(support.seeds, st.sampled_from(KINDS))
 def test_ideal_reading_is_gain_times_reading_plus_offset(seed: int, kind: str) -> None:
     """The statement itself, against the same machine with ideal sensors."""
-    platform = support.random_platform(seed, kind, sensors=True)
+    platform = machines.random_platform(seed, kind, sensors=True)
     pose = support.sample(platform, (5,), seed)
     ideal = gough.leg_lengths(_plain(platform), pose)
     found = platform.gain * gough.leg_lengths(platform, pose) + platform.offset
@@ -36,7 +37,7 @@ def test_ideal_reading_is_gain_times_reading_plus_offset(seed: int, kind: str) -
 
 @given(support.seeds)
 def test_readings_are_mujocos_tendons_through_offset_and_gain(seed: int) -> None:
-    platform = support.random_platform(seed, "length_change", sensors=True)
+    platform = machines.random_platform(seed, "length_change", sensors=True)
     pose = support.sample(platform, (), seed)
     length, _ = mujoco_model.measure(platform, pose)
     home, _ = mujoco_model.measure(platform, platform.home)
@@ -49,7 +50,7 @@ def test_readings_are_mujocos_tendons_through_offset_and_gain(seed: int) -> None
 @settings(max_examples=15)
 def test_inverse_then_forward_gives_the_pose_back(seed: int, kind: str, start: str) -> None:
     """In blocks (100 rows), alone (1 row) and from the tracker."""
-    platform = support.random_platform(seed, kind, sensors=True)
+    platform = machines.random_platform(seed, kind, sensors=True)
     pose = support.sample(platform, (100,), seed)
     legs = gough.leg_lengths(platform, pose)
     found = gough.solve(platform, legs, seed=start)
@@ -74,7 +75,7 @@ def test_stroke_limits_are_of_the_readings_as_they_come() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_mode_has_the_readings(kind: str) -> None:
-    platform = support.random_platform(3, kind, sensors=True)
+    platform = machines.random_platform(3, kind, sensors=True)
     modes = gough.assembly_modes(platform, platform.home_legs)
     plain = gough.assembly_modes(_plain(platform), _plain(platform).home_legs)
     assert len(modes.pose) == len(plain.pose)
@@ -90,7 +91,7 @@ def test_torch_agrees(kind: str) -> None:
     import gough.learn
     from gough.learn.graph import edge_lengths
 
-    platform = support.random_platform(5, kind, sensors=True)
+    platform = machines.random_platform(5, kind, sensors=True)
     pose = support.sample(platform, (4,))
     legs = gough.leg_lengths(platform, pose)
     position, rotation = torch.tensor(pose.position.copy()), torch.tensor(pose.rotation)

@@ -9,6 +9,7 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import machines
 import numpy as np
 import pytest
 import support
@@ -513,7 +514,7 @@ def test_a_pose_of_nan_is_not_in_the_workspace() -> None:
 def test_a_moved_origin_is_the_same_machine(seed: int) -> None:
     """Readings are the same when positions tell where another point of the platform is."""
     rng = np.random.default_rng(seed)
-    platform = replace(support.random_platform(seed), pivot=None)
+    platform = replace(machines.random_platform(seed), pivot=None)
     point = platform.size * rng.standard_normal(3)
     tool = platform.with_origin_at(point)
     pose = support.sample(platform, (4,), seed)

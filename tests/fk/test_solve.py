@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import machines
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -153,70 +154,6 @@ def test_number_types(dtype):
     platform = gough.Platform.load("reference")
     legs = np.full((2, 6), 655).astype(dtype)
     assert np.all(gough.solve(platform, legs).status == Status.CONVERGED)
-
-
-# ---- invariances ----------------------------------------------------------------------
-
-
-def _random_platform(rng):
-    """Joints of a general platform, neither planar nor symmetric, well conditioned at home."""
-    while True:
-        base = rng.normal(size=(6, 3)) * [1.0, 1.0, 0.1]
-        moving = rng.normal(size=(6, 3)) * [0.5, 0.5, 0.05]
-        platform = gough.Platform(base, moving, (0, 0, 1.5))
-        if gough.singularity_distance(platform, platform.home) > 0.2:
-            return base, moving
-
-
-@settings(max_examples=25)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([1e-3, 1 / 25.4, 1e3]))
-def test_scale_changes_nothing(seed, scale):
-    """The same machine in another unit: the same statuses and counts, the scaled poses."""
-    base, moving = _random_platform(np.random.default_rng(seed))
-    one = gough.Platform(base, moving, (0, 0, 1.5)).with_workspace(0.05, 5)
-    other = gough.Platform(base * scale, moving * scale, (0, 0, 1.5 * scale)).with_workspace(
-        0.05 * scale, 5
-    )
-    _, legs = _legs(one, 50)
-    a, b = gough.solve(one, legs), gough.solve(other, legs * scale)
-    np.testing.assert_array_equal(a.status, b.status)
-    good = a.status == Status.CONVERGED
-    sensitive = 1 / float(gough.singularity_distance(one, one.home))
-    np.testing.assert_allclose(
-        b.pose.position[good] / scale, a.pose.position[good], atol=1e-11 * sensitive
-    )
-
-
-@settings(max_examples=25)
-@given(st.integers(0, 2**32 - 1))
-def test_legs_in_another_order_change_nothing(seed):
-    rng = np.random.default_rng(seed)
-    base, moving = _random_platform(rng)
-    order = rng.permutation(6)
-    one = gough.Platform(base, moving, (0, 0, 1.5)).with_workspace(0.03, 3)
-    other = gough.Platform(base[order], moving[order], (0, 0, 1.5)).with_workspace(0.03, 3)
-    _, legs = _legs(one, 50)
-    a, b = gough.solve(one, legs), gough.solve(other, legs[:, order])
-    good = (a.status == Status.CONVERGED) & (b.status == Status.CONVERGED)
-    np.testing.assert_array_equal(a.status, b.status)
-    sensitive = 1 / float(gough.singularity_distance(one, one.home))
-    assert np.all(a.pose.distance(b.pose)[0][good] <= 1e-11 * sensitive)
-
-
-@settings(max_examples=25)
-@given(st.integers(0, 2**32 - 1))
-def test_moving_the_base_moves_the_poses(seed):
-    rng = np.random.default_rng(seed)
-    base, moving = _random_platform(rng)
-    shift = gough.Pose.from_rotation_vector(rng.normal(size=3) * 3, rng.normal(size=3))
-    one = gough.Platform(base, moving, (0, 0, 1.5)).with_workspace(0.03, 3)
-    other = gough.Platform(shift.apply(base), moving, shift @ one.home)
-    _, legs = _legs(one, 50)
-    a, b = gough.solve(one, legs, seed="home"), gough.solve(other, legs, seed="home")
-    good = (a.status == Status.CONVERGED) & (b.status == Status.CONVERGED)
-    assert np.mean(good) > 0.5
-    sensitive = 1 / float(gough.singularity_distance(one, one.home))
-    assert np.all((shift @ a.pose).distance(b.pose)[0][good] <= 1e-10 * sensitive)
 
 
 # ---- statuses -------------------------------------------------------------------------
@@ -454,7 +391,7 @@ def test_wrong_legs(legs):
 
 
 def test_a_polynomial_needs_a_workspace():
-    bare = gough.Platform(*_random_platform(np.random.default_rng(0)), (0, 0, 1.5))
+    bare = machines.general_platform(0)
     with pytest.raises(gough.PlatformError, match="workspace"):
         gough.solve(bare, bare.home_legs, seed="polynomial")
     assert gough.solve(bare, bare.home_legs).status == Status.CONVERGED

@@ -10,8 +10,9 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from learn.machines import reference, with_some_workspace
-from support import angles, random_platforms, random_twists, scaled, seeds
+from learn.networks import reference
+from machines import scaled, with_some_workspace
+from support import angles, random_platforms, random_twists, seeds
 
 import gough
 from gough import GoughError, Platform, Pose

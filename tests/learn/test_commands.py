@@ -4,7 +4,7 @@ import json
 
 import pytest
 import tyro
-from learn.machines import reference
+from learn.networks import reference
 
 from gough import GoughError
 from gough.commands import learn as commands

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from learn.machines import reference
+from learn.networks import reference
 
 from gough import GoughError, Pose, assembly_sign, leg_lengths
 from gough.learn import data as module

@@ -3,7 +3,8 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from learn.machines import network, random_platform, reference
+from learn.networks import network, reference
+from machines import random_platform
 
 from gough import leg_lengths
 
@@ -17,7 +18,7 @@ def gradients(model, value):
 @settings(max_examples=10)
 @given(st.integers(0, 10**6))
 def test_structured_equals_dense_to_rounding_with_gradients(seed):
-    platform = random_platform(np.random.default_rng(seed))
+    platform = random_platform(seed)
     model = network("disgnet", platform, seed, width=24)
     torch.manual_seed(seed)
     x, weight = torch.randn(7, 6).double(), torch.randn(7, 12).double()

@@ -11,7 +11,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from learn.machines import network, reference, tiny, with_model
+from learn.networks import network, reference, tiny, with_model
 
 from gough import GoughError, Platform, leg_lengths
 from gough.learn.checkpoint import save_tensors
@@ -189,7 +189,7 @@ import logging, sys, warnings
 sys.path.insert(0, {tests!r})
 warnings.simplefilter("always")
 import torch
-from learn.machines import network, reference, tiny
+from learn.networks import network, reference, tiny
 from gough.learn import export
 
 class Talking(torch.nn.Module):

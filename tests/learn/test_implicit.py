@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import torch
 from hypothesis import given
-from learn.machines import reference, with_some_workspace
+from learn.networks import reference
 from learn.test_batched_newton import planted, problem
+from machines import with_some_workspace
 from support import random_platforms
 from torch import Tensor
 from torch.autograd import gradcheck, gradgradcheck
@@ -29,7 +30,7 @@ TOLERANCE: dict[str, Any] = {"eps": 1e-6, "atol": 1e-4, "rtol": 1e-4}
 
 def of_one_size(platform: Platform) -> Platform:
     """In a unit that is the machine's size, so that one finite difference suits all arguments."""
-    from support import scaled
+    from machines import scaled
 
     return scaled(with_some_workspace(platform), 1 / platform.size)
 

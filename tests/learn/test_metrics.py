@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from learn.machines import reference
+from learn.networks import reference
 
 from gough import GoughError, Pose, leg_lengths, quaternion
 from gough.learn.metrics import measure
@@ -59,7 +59,7 @@ def test_different_numbers_of_poses_are_refused():
 
 @pytest.mark.parametrize("name", ["reference", "reachy_mini", "rubin_camera", "linuxcnc_genhex"])
 def test_newton_ends_at_the_true_pose_from_nearby(name):
-    from learn.machines import with_some_workspace
+    from machines import with_some_workspace
 
     from gough import Platform
 

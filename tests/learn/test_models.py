@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 import torch
-from learn.machines import network, random_platform, reference, with_some_workspace
+from learn.networks import network, reference
+from machines import random_platform, with_some_workspace
 
 from gough import GoughError, Platform, leg_lengths
 from gough.learn.loss import default_beta, pose_loss, training_loss
@@ -31,7 +32,7 @@ def test_the_best_network_is_no_larger_than_allowed():
 
 @pytest.mark.parametrize("kind", MODELS)
 def test_networks_give_poses_and_start_near_home(kind):
-    platform = random_platform(np.random.default_rng(1))
+    platform = random_platform(1)
     torch.manual_seed(0)
     model = build(kind, platform, Scaling.of(platform)).eval()
     legs = torch.tensor(leg_lengths(platform, platform.sample_poses(50, 3)))

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 import torch
-from learn.machines import reference, with_some_workspace
+from learn.networks import reference
+from machines import with_some_workspace
 
 from gough import GoughError, Platform, Pose, assembly_sign, leg_lengths, quaternion
 from gough.learn.kinematics import TorchPlatform, euler_to_matrix, quaternion_to_matrix

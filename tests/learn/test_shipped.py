@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from learn.machines import reference
+from learn.networks import reference
 
 from gough import GoughError, Platform, leg_lengths
 from gough.learn.evaluate import HELD_OUT, default_names, evaluate, held_out, table, to_json

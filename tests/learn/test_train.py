@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from learn.machines import random_platform, reference, tiny, with_model
+from learn.networks import reference, tiny, with_model
+from machines import random_platform
 
 from gough import GoughError, leg_lengths
 from gough.learn.checkpoint import load_tensors, save_tensors
@@ -69,7 +70,7 @@ def test_every_network_learns(tmp_path, kind):
     options = {"width": 16} | ({"hidden": 32} if kind == "graphmlp" else {})
     config = with_model(tiny(), kind, **options)
     config = replace(config, optimiser=replace(config.optimiser, lr=6e-3))
-    trainer = Trainer(random_platform(np.random.default_rng(0)), config, tmp_path)
+    trainer = Trainer(random_platform(0), config, tmp_path)
     before = trainer.measure(0.0, 0.0)["rot_deg"]
     while trainer.step < 120:
         trainer.learn(trainer.step / 120)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from modes.machines import ALL, TELESCOPIC, found, poses_of, random_platform
+from machines import ALL, TELESCOPIC, general_platform
+from modes.poses import found, poses_of
 
 import gough
 from gough.modes import assembly
@@ -83,7 +84,7 @@ def test_newton_from_random_starts_finds_nothing_more(name):
 
 def test_random_platforms_have_forty_solutions():
     for seed in range(40):
-        assert find_start(random_platform(seed)).count == 40
+        assert find_start(general_platform(seed)).count == 40
 
 
 @pytest.mark.parametrize(
@@ -98,7 +99,7 @@ def test_random_platforms_have_forty_solutions():
 )
 def test_special_platforms_have_fewer_solutions(base, moving, planar, count):
     """Counts from the literature: 6-3: 16 (Innocenti, Parenti-Castelli 1990), 6-4: 32."""
-    assert find_start(random_platform(4, base, moving, planar)).count == count
+    assert find_start(general_platform(4, base, moving, planar)).count == count
 
 
 @pytest.mark.parametrize(
@@ -131,7 +132,7 @@ def test_all_complex_ends_are_proven_in_ball_arithmetic():
     """Forty solutions of three platforms, real and complex, each proven, none twice."""
     balls = pytest.importorskip("gough.modes.balls")
     for seed in range(3):
-        platform = random_platform(seed)
+        platform = general_platform(seed)
         start = find_start(platform)
         base, squares = (
             start.frames.base(platform.base),

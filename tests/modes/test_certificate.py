@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from modes.machines import ALL, poses_of
+from machines import ALL
+from modes.poses import poses_of
 
 import gough
 from gough import quaternion

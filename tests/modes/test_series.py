@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from modes.machines import poses_of
+from modes.poses import poses_of
 
 import gough
 from gough.kernel.jit import jit

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from modes.machines import griffis_duffy
+from machines import griffis_duffy
 
 import gough
 from gough.status import ModesStatus

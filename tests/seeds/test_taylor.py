@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support import moved, permuted, random_platform, random_platforms, scaled
+from machines import permuted, random_platform, scaled
+from support import moved, random_platforms
 
 import gough
 from gough.seeds.base import find_seed

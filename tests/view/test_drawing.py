@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import random_platform, scaled
+from machines import random_platform, scaled
 
 import gough
 from gough import Platform

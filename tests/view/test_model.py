@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import scaled
+from machines import scaled
 
 import gough
 from gough import Platform, Pose

@@ -5,31 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import torch
 
-from gough import Platform, Workspace
+from gough import Platform
 from gough.learn.config import DataConfig, ModelConfig, OptimiserConfig, RunConfig, TrainConfig
 from gough.learn.models import Scaling, build
 
 
 def reference() -> Platform:
     return Platform.load("reference")
-
-
-def with_some_workspace(platform: Platform) -> Platform:
-    """Itself, or with a small workspace if it states none."""
-    return platform if platform.workspace else platform.with_workspace(0.02 * platform.size, 5)
-
-
-def random_platform(rng: np.random.Generator) -> Platform:
-    """Twelve joints near two hexagons, no symmetry."""
-    turn = np.arange(6) * np.pi / 3 + rng.uniform(-0.3, 0.3, (2, 6))
-    circles = np.stack([np.cos(turn), np.sin(turn), rng.uniform(-0.1, 0.1, (2, 6))], axis=-1)
-    return Platform(
-        400 * circles[0], 200 * circles[1], home=(0, 0, 500), unit="mm",
-        workspace=Workspace.about_home(30, 10),
-    )  # fmt: skip
 
 
 def network(kind: str, platform: Platform, seed: int = 0, **options) -> Any:
