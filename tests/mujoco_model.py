@@ -34,6 +34,35 @@ def measure(platform: Platform, pose: Pose, angles: Floats | None = None) -> tup
     return data.ten_length.copy(), rows
 
 
+def accelerations(
+    platform: Platform, pose: Pose, load: Floats, forces: Floats, angles: Floats | None = None
+) -> Floats:
+    """Accelerations of the machine, at rest, under actuator forces and a wrench on the platform.
+
+    The platform has mass 1 and inertia 1 about the pivot, each arm inertia 1.
+
+    Args:
+        load: (6,) force and moment about the pivot, in world axes.
+        forces: (6,) of actuators at the tendons, or at the hinges at `angles`, whose rods then
+            carry what keeps the arms at rest.
+
+    Returns:
+        (6,) of the platform, or (12,) with those of the arms in front.
+    """
+    model = mujoco.MjModel.from_xml_string(_mjcf(platform))
+    data = mujoco.MjData(model)
+    arms = [] if angles is None else angles
+    data.qpos[:] = [*arms, *(pose.position + platform.pivot_point), *pose.wxyz]
+    data.xfrc_applied[model.body("moving").id] = load
+    data.ctrl[:6] = forces
+    mujoco.mj_forward(model, data)
+    if angles is not None:
+        rods = np.diagonal(_dense_tendon_jacobian(model, data)[:, :6])
+        data.ctrl[6:] = -forces / rods
+        mujoco.mj_forward(model, data)
+    return data.qacc.copy()
+
+
 def _mjcf(platform: Platform) -> str:
     base, moving = platform.base, platform.moving - platform.pivot_point
     if platform.rotary is None:
@@ -45,10 +74,13 @@ def _mjcf(platform: Platform) -> str:
         f'<spatial name="t{i}"><site site="b{i}"/><site site="p{i}"/></spatial>' for i in range(6)
     )
     mass = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    motors = "".join(f'<motor tendon="t{i}"/>' for i in range(6))
+    if platform.rotary is not None:
+        motors = "".join(f'<motor joint="h{i}"/>' for i in range(6)) + motors
     return (
         '<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>'
         f'{fixed}<body name="moving"><freejoint/>{mass}{sites}</body>'
-        f"</worldbody><tendon>{tendons}</tendon></mujoco>"
+        f"</worldbody><tendon>{tendons}</tendon><actuator>{motors}</actuator></mujoco>"
     )
 
 
@@ -57,8 +89,9 @@ def _arm(platform: Platform, i: int) -> str:
     arms = platform.rotary
     assert arms is not None
     axes = f"{_text(arms.axis_x[i])} {_text(arms.axis_y[i])}"
+    hinge = f'<joint name="h{i}" type="hinge" axis="0 0 1"/>'
     return (
-        f'<body pos="{_text(platform.base[i])}" xyaxes="{axes}"><joint type="hinge" axis="0 0 1"/>'
+        f'<body pos="{_text(platform.base[i])}" xyaxes="{axes}">{hinge}'
         f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
         f'<site name="b{i}" pos="{float(arms.arm_length[i])!r} 0 0"/></body>'
     )

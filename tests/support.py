@@ -16,6 +16,8 @@ Floats = NDArray[np.floating]
 BATCHES: tuple[tuple[int, ...], ...] = ((), (1,), (3, 1, 2, 1))
 # [rad] no turn, turns whose squares or cubes vanish, ordinary turns, nearly and exactly half a turn
 ANGLES = (0.0, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 0.299, 0.3, 0.301, 1.0, 2.5, np.pi - 1e-8, np.pi)
+# legs are vertical, and dependent at every pose
+PRISM = Platform(*[Platform.load("reference").base] * 2, home=(0, 0, 100), name="prism")
 TELESCOPIC_LIKE = tuple(n for n in Platform.catalog() if Platform.load(n).legs != "rotary")
 
 seeds = st.integers(0, 2**32 - 1)

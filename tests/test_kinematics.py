@@ -50,8 +50,7 @@ def test_all_forty_poses_of_dietmaier_have_the_same_legs() -> None:
 
 def test_straight_up() -> None:
     """A prism whose legs are vertical: readings are the height, and no twist changes them."""
-    platform = Platform(REFERENCE.base, REFERENCE.base, home=(0, 0, 100))
-    pose = Pose((0, 0, 250))
+    platform, pose = support.PRISM, Pose((0, 0, 250))
     np.testing.assert_allclose(leg_lengths(platform, pose), [250] * 6)
     np.testing.assert_allclose(jacobian(platform, pose)[:, :3], [[0, 0, 1]] * 6)
     assert singularity_distance(platform, pose) < 1e-15
@@ -365,8 +364,7 @@ def test_ways_of_telling_the_noise_agree(platform: Platform, seed: int) -> None:
 
 
 def test_covariance_of_a_singular_pose_is_nan() -> None:
-    prism = Platform(REFERENCE.base, REFERENCE.base, home=(0, 0, 100))
-    assert np.all(np.isnan(gough.pose_covariance(prism, Pose((0, 0, 250)), 1.0)))
+    assert np.all(np.isnan(gough.pose_covariance(support.PRISM, Pose((0, 0, 250)), 1.0)))
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,11 @@ from .seeds.network import NetworkSeed as NetworkSeed
 from .status import Event as Event
 from .status import ModesStatus as ModesStatus
 from .status import Status as Status
+from .velocities import leg_accelerations as leg_accelerations
+from .velocities import leg_forces as leg_forces
+from .velocities import leg_rates as leg_rates
+from .velocities import twist as twist
+from .velocities import wrench as wrench
 from .workspace import Workspace as Workspace
 
 __all__: list[str]

@@ -18,13 +18,8 @@ DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
 Angles = Literal["deg", "rad"]
 
 
-def leg_columns(where: str, found: Sequence[str], *, cure: str = "") -> tuple[str, ...]:
-    """The six leg columns of a file or table whose columns are `found`.
-
-    Args:
-        where: the file or table, for messages.
-        found: names of its columns.
-        cure: advice to add where columns are missing.
+def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
+    """The six leg columns of a file whose columns are `found`.
 
     Raises:
         InputError: some are missing or occur twice; the message lists those found.
@@ -34,14 +29,9 @@ def leg_columns(where: str, found: Sequence[str], *, cure: str = "") -> tuple[st
         some = f"no column {', '.join(missing)}" if len(missing) < 6 else "no leg columns"
         raise InputError(
             f"{where}: {some}; expected leg_1 to leg_6, found {_list(found)}; "
-            f"{_rename(missing, found)}{cure}"
+            f"{_rename(missing, found)}"
         )
     return checked(where, found, LEGS)
-
-
-def file_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
-    """`leg_columns` of a file, whose columns can be named on the command line."""
-    return leg_columns(where, found, cure=", or name those of legs 1 to 6: --columns A,B,C,D,E,F")
 
 
 def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
@@ -79,7 +69,7 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     except InputError:
         if not has_legs:
             raise
-        return file_leg_columns(where, found)
+        return leg_columns(where, found)
 
 
 def pose_names(angles: Angles | None) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ COMMANDS = {
     "platforms": (
         "gough.commands.platforms", "run", "The machines that come with gough, to copy and edit.",
     ),
+    "export": ("gough.commands.export", "FORMATS", "A machine for other programs, such as C."),
     "dataset": ("gough.commands.learn", "dataset", "Poses and leg readings to train networks on."),
     "train": ("gough.commands.learn", "train", "Train a network that guesses a machine's poses."),
     "evaluate": ("gough.commands.learn", "evaluate", "Compare the errors of first guesses."),

@@ -1,0 +1,141 @@
+"""A platform as C constants: the numbers that the compiled solver itself works on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gough import quaternion
+from gough.checks import Array
+from gough.export.precision import Precision
+from gough.fk.bulk import other_starts
+from gough.kernel import constants as platform_constants
+from gough.kernel import cycle, descent, layout
+from gough.platform import Platform
+
+DESCENT_STEPS = 33  # in one call, beside the Newton steps of `cycle`
+MAX_STEPS = cycle.STEPS + DESCENT_STEPS
+SWEEPS = 6  # of rotations for the smallest singular value: its error is then far below SINGULAR
+START_COUNT = 8  # home, and poses about it, one tried a cycle
+
+
+def constant_lines(platform: Platform, precision: Precision) -> str:
+    """Definitions of all constants that the template `hexapod.c` uses.
+
+    Their values come from `kernel.constants`, their names say what they are.
+    """
+    constants = platform_constants.constants(platform)
+    order = constants[layout.ORDER : layout.ORDER + 6].astype(int)
+    integers = {"ROTARY": int(platform.rotary is not None), "START_COUNT": START_COUNT}
+    lines = [*_arithmetic(precision), "", *_limits(precision), ""]
+    lines += [f"#define {name} {value}" for name, value in integers.items()]
+    lines.append(f"static const int LEG_ORDER[6] = {{{', '.join(map(str, order))}}};")
+    for name, value in _tables(platform, _loosened(constants, platform, precision), order).items():
+        lines.append(_definition(name, np.asarray(value), precision))
+    return "\n".join(lines)
+
+
+def _tables(platform: Platform, c: Array, order: NDArray[np.intp]) -> dict[str, ArrayLike]:
+    """Constants by their names in C, cut out of the flat array `c`."""
+
+    def cut(at: int, *shape: int) -> Array:
+        return c[at : at + int(np.prod(shape))].reshape(shape)
+
+    tables: dict[str, ArrayLike] = {
+        "SIZE": c[layout.SIZE],
+        "PER_SIZE": c[layout.PER_SIZE],
+        "RADIUS": c[layout.RADIUS],
+        "HOME_SIGN": c[layout.REFERENCE],
+        "ENOUGH": c[layout.ENOUGH],
+        "PLATFORM_JOINTS": cut(layout.JOINTS, 6, 3),
+        "BASE_JOINTS": cut(layout.FIXED, 6, 3),
+        "PIVOT": cut(layout.PIVOT, 3),
+        "ORIGIN": cut(layout.ORIGIN, 3),
+        "GAIN": cut(layout.GAIN, 6),
+        "ZERO": cut(layout.ZERO, 6),
+        "STROKE": cut(layout.STROKE, 6, 2),
+        "HOME_SHIFT": cut(layout.CENTRE, 3),
+        "HOME_INVERSE": quaternion.to_matrix(cut(layout.HOME, 4)).T.ravel(),
+        "SHIFT_LOW": cut(layout.SHIFT_LOW, 3),
+        "SHIFT_HIGH": cut(layout.SHIFT_HIGH, 3),
+        "TURN_RANGE": cut(layout.TURN, 3, 3),
+        "STARTS": other_starts(platform, START_COUNT),
+    }
+    if platform.rotary is not None:
+        arms = platform.rotary
+        squares = (arms.arm_length**2 - arms.rod_length**2) / platform.size**2
+        tables |= {
+            "ROD": cut(layout.ROD, 6),
+            "ARM_X": cut(layout.ARM_X, 6, 3),
+            "ARM_Y": cut(layout.ARM_Y, 6, 3),
+            "ARM_ROD": squares[order],  # for the law of cosines
+            "BRANCH": arms.branch[order],
+        }
+    return tables
+
+
+def _definition(name: str, value: Array, precision: Precision) -> str:
+    if value.ndim == 0:
+        return f"#define {name} {precision.literal(float(value))}"
+    dimensions = "".join(f"[{n}]" for n in value.shape)
+    return f"static const real {name}{dimensions} = {_braces(value, precision)};"
+
+
+def _arithmetic(precision: Precision) -> list[str]:
+    """How numbers of this kind are written, and their functions called."""
+    names = ("sqrt", "fabs", "sin", "cos")
+    functions = [f"#define {name.upper()} {name}{precision.suffix}" for name in names]
+    return [
+        "#define R(x) ((real)(x))",
+        "#define INFINITE R(INFINITY)",
+        "#define PI R(3.14159265358979323846)",
+        *functions,
+    ]
+
+
+def _limits(precision: Precision) -> list[str]:
+    """Limits of steps, and what counts as small."""
+    steps = {
+        "NEWTON_STEPS": cycle.STEPS,
+        "DESCENT_STEPS": DESCENT_STEPS,
+        "SWEEPS": SWEEPS,
+        "MOST_MISSED": 1_000_000,
+    }
+    numbers = {
+        "TOLERANCE": precision.tolerance,
+        "SMALL_STEP": precision.small_step,
+        "SINGULAR": platform_constants.SINGULAR,
+        "LONGEST_SHIFT": descent.LONGEST_SHIFT,
+        "LARGEST_TURN": descent.LARGEST_TURN,
+        "NEGLIGIBLE": precision.negligible,
+        "HOPELESS": descent.HOPELESS,
+        "FLAT": descent.FLAT,
+        "TINY": precision.tiny,
+    }
+    return [f"#define {name} {value}" for name, value in steps.items()] + [
+        f"#define {name} {precision.literal(value)}" for name, value in numbers.items()
+    ]
+
+
+def _loosened(c: Array, platform: Platform, precision: Precision) -> Array:
+    """The constants with the workspace widened by what numbers of this kind round away."""
+    loose = c.copy()
+    extra = precision.slack - platform_constants.SLACK
+    loose[layout.SHIFT_LOW : layout.SHIFT_LOW + 3] -= extra
+    loose[layout.SHIFT_HIGH : layout.SHIFT_HIGH + 3] += extra
+    if extra > 0 and platform.workspace is not None:
+        low, high = np.radians(platform.workspace.rotation_deg.T)
+        half = (high - low) / 2 + precision.slack
+        cosine = np.cos(np.minimum(half, np.pi)) - precision.cosine_slack
+        loose[layout.TURN + 2 : layout.TURN + 9 : 3] = np.where(half >= np.pi, -2.0, cosine)
+    return loose
+
+
+def _braces(values: Array, precision: Precision) -> str:
+    """Nested C initialisers."""
+    if values.ndim == 0:
+        return precision.literal(float(values))
+    inner = [_braces(value, precision) for value in values]
+    if values.ndim == 1:
+        return "{" + ", ".join(inner) + "}"
+    return "{\n    " + ",\n    ".join(inner) + "}"
