@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import signal
@@ -26,9 +27,12 @@ def main(arguments: list[str] | None = None) -> None:
     or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 asked to terminate.
     """
     given = sys.argv[1:] if arguments is None else arguments
+    notes = logging.StreamHandler()  # what readers of files recognised, on standard error
+    logging.getLogger("gough").addHandler(notes)
     signals.listen()
     code = _run(given)
     signals.ignore()
+    logging.getLogger("gough").removeHandler(notes)
     sys.exit(code)
 
 
