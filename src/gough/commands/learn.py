@@ -76,6 +76,7 @@ def train(
     resume: bool = False,
     prepare: bool = False,
     start: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")] = None,
+    from_: Annotated[str | None, arg(name="from", metavar="NAME", help_behavior_hint="")] = None,
     budget: Annotated[str | None, arg(metavar="TIME", help_behavior_hint="")] = None,
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     seed: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,
@@ -97,11 +98,15 @@ def train(
         resume: go on with the run of this folder, after it was stopped or killed.
         prepare: only make the folder, for torchrun -m gough.learn.train FOLDER.
         start: another run, whose weights are the first of this one.
+        from_: universal, the network for any hexapod that comes with gough, or a run of it: tune it
+            for this platform, one minute of processor time unless a budget is given.
         budget: time to train, such as 90s, 30m or 2h; the preset's unless given.
         steps: number of steps in place of a budget; such a run repeats bit for bit.
         seed: of the weights at the start and of the samples.
         device: cpu, cuda, cuda:1; a GPU if there is one unless given.
     """
+    if from_ is not None:
+        return _finetune(_platform(platform, workspace), platform, out, from_, resume, budget, seed)
     from gough.learn import train as loop
 
     changes = {"budget": budget, "steps": steps, "seed": seed, "device": device}
@@ -162,6 +167,15 @@ def evaluate(
         from gough.whole_file import write_whole
 
         write_whole(json, loop.to_json(rows).encode())
+    return 0
+
+
+def _finetune(machine, name: str, out: Path, start: str, resume: bool, budget: str | None,
+              seed: int | None) -> int:  # fmt: skip
+    from gough.learn.universal.finetune import finetune
+
+    finetune(machine, out, start, resume=resume, budget=budget, seed=seed or 0)
+    print(f"{out}: tuned; use it with: gough solve LEGS -p {name} --seed {out}")
     return 0
 
 

@@ -52,7 +52,8 @@ class Row:
 
 def default_names(platform: Platform) -> list[str]:
     """Home, Taylor series, polynomials, and all networks that come for this platform."""
-    return ["home", "taylor-2", *(f"polynomial-{d}" for d in DEGREES), *shipped_names(platform)]
+    fitted = [f"polynomial-{d}" for d in DEGREES]
+    return ["home", "taylor-2", *fitted, "universal", *shipped_names(platform)]
 
 
 def held_out(platform: Platform, count: int, same_assembly: bool) -> tuple[Pose, Array]:

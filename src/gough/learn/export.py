@@ -59,14 +59,18 @@ def facts_of(model: PoseNetwork, config: TrainConfig, record: dict) -> dict:
 def to_onnx(model: PoseNetwork, facts: dict) -> bytes:
     """A sealed ONNX file: legs (N, 6) float64 to raw numbers (N, outputs) float64."""
     legs = torch.as_tensor(model.scaling.leg_mean).expand(2, 6).contiguous()
-    with _quiet():
+    with quiet():
         program = torch.onnx.export(
             _Raw(model).eval(), (legs,), dynamo=True, external_data=False, opset_version=18,
             input_names=["legs"], output_names=["raw"],
             dynamic_shapes=({0: torch.export.Dim("rows", min=1)},), verbose=False,
         )  # fmt: skip
     assert program is not None
-    proto = program.model_proto
+    return finish_onnx(program.model_proto, facts)
+
+
+def finish_onnx(proto: onnx.ModelProto, facts: dict) -> bytes:
+    """A sealed ONNX file of a graph and its facts."""
     _strip(proto)
     entry = proto.metadata_props.add()
     entry.key, entry.value = "gough", json.dumps(facts)
@@ -122,7 +126,7 @@ REMARKS = {
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Without these remarks; all other warnings pass."""
     drop = [
         (logging.getLogger(name), lambda record, start=start: not record.msg.startswith(start))
@@ -133,6 +137,7 @@ def _quiet() -> Iterator[None]:
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", ".*treespec, LeafSpec.*deprecated", FutureWarning)
+            warnings.filterwarnings("ignore", "(?s).*The axis name: .* will not be used", UserWarning)
             yield
     finally:
         for logger, rule in drop:

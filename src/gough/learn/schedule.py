@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from typing import Protocol
 
-from gough.learn.config import OptimiserConfig, TrainConfig, seconds
+from gough.learn.config import OptimiserConfig, RunConfig, seconds
 
 RESERVE = 0.03  # share of a budget kept for the last checkpoint and the export,
 MOST_RESERVED = 10.0  # at most so many seconds
@@ -21,6 +22,19 @@ def learning_rate(config: OptimiserConfig, step: int, progress: float) -> float:
     return rate
 
 
+class Lasting(Protocol):
+    """Settings that state how long a run lasts."""
+
+    @property
+    def run(self) -> RunConfig:
+        """Its budget and clock."""
+        ...
+
+    def total_steps(self) -> int | None:
+        """Steps of the run, None under a budget."""
+        ...
+
+
 class Clock:
     """Progress by steps, or by time under a budget.
 
@@ -31,7 +45,7 @@ class Clock:
         elapsed: seconds trained so far, over all resumptions, by the configuration's clock.
     """
 
-    def __init__(self, config: TrainConfig) -> None:
+    def __init__(self, config: Lasting) -> None:
         self.total = config.total_steps()
         self.budget = None
         if self.total is None:

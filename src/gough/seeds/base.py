@@ -122,6 +122,8 @@ def _named(platform: Platform, name: str) -> Seed:
         return _polynomial(platform, int(degree or DEGREE))
     if kind == "taylor" and (degree == "" or degree.isdecimal()):
         return TaylorSeed(platform, int(degree or 2))
+    if name == "universal":
+        return _universal(platform)
     return _network(platform, name)
 
 
@@ -135,15 +137,23 @@ def _network(platform: Platform, name: str) -> Seed:
     if Path(name).exists() or Path(name).suffix or len(Path(name).parts) > 1:
         return find_network(platform, name)
     raise GoughError(
-        f"seed: unknown name {name!r}; expected auto, home, taylor-ORDER, polynomial-DEGREE, the "
-        f"path of a trained network, or one that comes with gough for platform {platform.name!r} "
-        f"as it is now ({', '.join(ours) or 'there is none: see gough train'})"
+        f"seed: unknown name {name!r}; expected auto, home, universal, taylor-ORDER, "
+        "polynomial-DEGREE, the path of a trained network, or one that comes with gough for "
+        f"platform {platform.name!r} as it is now "
+        f"({', '.join(ours) or 'there is none: see gough train'})"
     )
 
 
 @lru_cache(maxsize=64)
 def _polynomial(platform: Platform, degree: int) -> Seed:
     return PolynomialSeed(platform, degree)
+
+
+@lru_cache(maxsize=64)
+def _universal(platform: Platform) -> Seed:
+    from gough.seeds.universal import UniversalSeed
+
+    return UniversalSeed(platform)
 
 
 @lru_cache(maxsize=8)

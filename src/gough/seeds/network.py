@@ -12,6 +12,7 @@ import hashlib
 import json
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose
+
+if TYPE_CHECKING:
+    from gough.seeds.universal import UniversalSeed
 
 FORMAT = 1
 NETWORK = "network.onnx"
@@ -51,7 +55,7 @@ class NetworkSeed:
         """
         file = Path(path)
         file = file / NETWORK if file.is_dir() else file
-        self._open(platform, _read(file), str(path), threads)
+        self._open(platform, read(file), str(path), threads)
 
     @classmethod
     def shipped(cls, platform: Platform, name: str = "disgnet", *, threads: int = 0) -> NetworkSeed:
@@ -73,10 +77,9 @@ class NetworkSeed:
         return seed
 
     def _open(self, platform: Platform, content: bytes, where: str, threads: int) -> None:
-        body = _unseal(content, where)
-        self.facts = _facts(body, where)
+        self.facts = read_facts(content, where)
         _check_platform(platform, self.facts, where)
-        self._session = _session(content, where, threads)
+        self._session = session(content, where, threads)
         self.name = self.facts["kind"]
         self.leg_range: Array = np.array(self.facts["leg_range"])
         self._platform = platform
@@ -170,6 +173,15 @@ def _unseal(content: bytes, where: str) -> bytes:
     return body
 
 
+def read_facts(content: bytes, where: str) -> dict:
+    """What the file of a network says about it.
+
+    Raises:
+        GoughError: a damaged file, or one of another format.
+    """
+    return _facts(_unseal(content, where), where)
+
+
 def _facts(body: bytes, where: str) -> dict:
     """The JSON text of the metadata entry "gough", without parsing the graph."""
     at = body.rfind(b"\x0a\x05gough\x12")
@@ -208,7 +220,12 @@ def _check_platform(platform: Platform, facts: dict, where: str) -> None:
         )
 
 
-def _read(path: Path) -> bytes:
+def read(path: Path) -> bytes:
+    """The content of a file.
+
+    Raises:
+        GoughError: it cannot be read.
+    """
     try:
         return path.read_bytes()
     except OSError as error:
@@ -222,14 +239,20 @@ def _shipped_files() -> list:
     return sorted((f for f in files.iterdir() if f.name.endswith(".onnx")), key=lambda f: f.name)
 
 
-def find_network(platform: Platform, name: str | Path) -> NetworkSeed:
+def find_network(platform: Platform, name: str | Path) -> NetworkSeed | UniversalSeed:
     """A network by the name of one that comes with the package, or the path of a run or file.
 
     Raises:
         GoughError: there is none, or it is damaged or of another platform.
     """
+    from gough.seeds.universal import KIND, UniversalSeed
+
+    if str(name) == KIND:
+        return UniversalSeed(platform)
     if Path(name).exists():
-        return NetworkSeed(platform, name)
+        file = Path(name) / NETWORK if Path(name).is_dir() else Path(name)
+        universal = read_facts(read(file), str(name))["kind"] == KIND
+        return (UniversalSeed if universal else NetworkSeed)(platform, name)
     if Path(name).suffix or len(Path(name).parts) > 1:
         raise GoughError(f"{name}: no such run's folder or .onnx file")
     return NetworkSeed.shipped(platform, str(name))
@@ -244,13 +267,18 @@ def _shipped(platform: Platform) -> list[tuple[str, dict]]:
     """File name and facts of each of them."""
     out = []
     for file in _shipped_files():
-        facts = _facts(_unseal(file.read_bytes(), file.name), file.name)
+        facts = read_facts(file.read_bytes(), file.name)
         if facts["platform"] == platform.digest:
             out.append((file.name, facts))
     return out
 
 
-def _session(content: bytes, where: str, threads: int):
+def session(content: bytes, where: str, threads: int):
+    """An onnxruntime session that evaluates a network's file on the CPU.
+
+    Raises:
+        GoughError: onnxruntime cannot run it.
+    """
     import onnxruntime
 
     options = onnxruntime.SessionOptions()

@@ -16,10 +16,11 @@ J x_1 = d and J x_k = -(what x_1 to x_(k-1) contribute at order k).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough import quaternion
 from gough.checks import Array
@@ -120,6 +121,13 @@ class HomeStruts:
         lengths = lengths[..., None] if many else lengths.T[None]
         rows = jacobian(by_component(joints - base), by_component(joints))[:, 0]
         return cls(base, joints, _inverses(platform, rows), lengths - home[..., None], lengths)
+
+    def pick(self, chosen: NDArray[np.bool_]) -> HomeStruts:
+        """The chosen (M, N) of the readings."""
+        if len(self.base) == 1:
+            rows = chosen[0]
+            return replace(self, change=self.change[..., rows], lengths=self.lengths[..., rows])
+        return HomeStruts(*(getattr(self, f.name)[chosen[:, 0]] for f in fields(self)))
 
     def pose(self, platform: Platform, t: Array, wxyz: Array) -> Pose:
         """Poses (N,) after translations (3, M, N) and rotations (4, M, N) from home."""
