@@ -137,7 +137,7 @@ def quiet() -> Iterator[None]:
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", ".*treespec, LeafSpec.*deprecated", FutureWarning)
-            warnings.filterwarnings("ignore", "(?s).*The axis name: .* will not be used", UserWarning)
+            warnings.filterwarnings("ignore", "(?s).*axis name: .* not be used", UserWarning)
             yield
     finally:
         for logger, rule in drop:
