@@ -18,8 +18,13 @@ DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
 Angles = Literal["deg", "rad"]
 
 
-def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
-    """The six leg columns of a file whose columns are `found`.
+def leg_columns(where: str, found: Sequence[str], *, cure: str = "") -> tuple[str, ...]:
+    """The six leg columns of a file or table whose columns are `found`.
+
+    Args:
+        where: the file or table, for messages.
+        found: names of its columns.
+        cure: advice to add where columns are missing.
 
     Raises:
         InputError: some are missing or occur twice; the message lists those found.
@@ -29,9 +34,14 @@ def leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
         some = f"no column {', '.join(missing)}" if len(missing) < 6 else "no leg columns"
         raise InputError(
             f"{where}: {some}; expected leg_1 to leg_6, found {_list(found)}; "
-            f"{_rename(missing, found)}"
+            f"{_rename(missing, found)}{cure}"
         )
     return checked(where, found, LEGS)
+
+
+def file_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
+    """`leg_columns` of a file, whose columns can be named on the command line."""
+    return leg_columns(where, found, cure=", or name those of legs 1 to 6: --columns A,B,C,D,E,F")
 
 
 def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
@@ -69,7 +79,7 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     except InputError:
         if not has_legs:
             raise
-        return leg_columns(where, found)
+        return file_leg_columns(where, found)
 
 
 def pose_names(angles: Angles | None) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from gough.workspace import Workspace
 
 REQUIRED = ("base", "moving", "home")
 PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
-OPTIONAL = (*PLAIN, "workspace", "rotary")
+OPTIONAL = (*PLAIN, "workspace", "rotary", "readings")  # readings: see files.log_format
 TABLES = {
     "home": ("position", "wxyz", "euler_deg"),
     "workspace": ("translation", "rotation_deg"),

@@ -149,7 +149,7 @@ def test_version(gough):
         (["solve", "x.csv", "-p", "reference", "--angles", "grad"], "grad"),
         (["solve", "x.csv", "-p", "reference", "--block-rows", "0"], "block_rows"),
         (["solve", "x.csv", "-p", "referense"], "did you mean 'reference'"),
-        (["solve", "x.txt", "-p", "reference"], "must end in .csv or .parquet"),
+        (["solve", "x.doc", "-p", "reference"], "must end in .csv or .parquet"),
         (["solve", "none.csv", "-p", "reference"], "none.csv: cannot be read: No such file"),
         (["solve", ".", "-p", "reference"], "must end in .csv or .parquet"),
         (["platforms", "rubin"], "the catalog has"),

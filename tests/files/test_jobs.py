@@ -207,7 +207,7 @@ def test_a_pose_that_no_motor_reaches_is_named(tmp_path):
     ("old", "new", "words"),
     [
         ("leg_3", "strut3", "no column leg_3; expected leg_1 to leg_6, found time, leg_1"),
-        ("leg_", "L", "no leg columns; expected leg_1 to leg_6, found time, L1"),
+        ("leg_", "width", "no leg columns; expected leg_1 to leg_6, found time, width1"),
         ("time", "leg_1", "two columns are called 'leg_1'"),
     ],
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from gough.commands.options import (
     AllowFailures,
@@ -13,6 +13,7 @@ from gough.commands.options import (
     IgnorePlatform,
     Keep,
     KeepBadRows,
+    LogOptions,
     Out,
     PlatformName,
     reading_options,
@@ -30,6 +31,7 @@ def run(
     ignore_platform: IgnorePlatform = False,
     head: Head = 5,
     block_rows: BlockRows = 65536,
+    log: OmitArgPrefixes[LogOptions] = LogOptions(),  # noqa: B008 - frozen
 ) -> int:
     """Calculate leg readings from a file of poses.
 
@@ -52,6 +54,8 @@ def run(
     with show.progress_bar() as progress:
         report = inverse_file(
             poses, out, machine, progress=progress, head=0 if out else head,
-            reading=reading_options(keep, keep_bad_rows, ignore_platform, block_rows),
+            reading=reading_options(
+                platform, keep, keep_bad_rows, ignore_platform, block_rows, log
+            ),
         )  # fmt: skip
     return show.print_report(report, machine, poses, out, head, show.print_legs, allow_failures)

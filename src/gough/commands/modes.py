@@ -51,7 +51,7 @@ def run(
 
     machine = Platform.load(platform)
     draw = None if plot is None else _painter(plot)
-    modes = assembly_modes(machine, readings(legs, machine), threads=threads)
+    modes = assembly_modes(machine, readings(legs, machine, platform), threads=threads)
     choice = choose_mode(modes)
     _print(modes, choice, show.console_beside(out))
     if out is not None:
@@ -70,18 +70,20 @@ def _painter(path: str) -> Callable[[AssemblyModes], None]:
     return lambda modes: save(modes_figure(modes), path)
 
 
-def readings(legs: tuple[str, ...], platform: Platform) -> Array:
+def readings(legs: tuple[str, ...], platform: Platform, name: str) -> Array:
     """Six numbers (6,), those in a file (N, 6), or those at home if nothing is given.
 
     Raises:
         InputError: neither six numbers nor a file that can be read.
     """
+    from gough.commands.options import FILE_ENDINGS, reading_options
+
     if not legs:
         return platform.home_legs
-    if len(legs) == 1 and (legs[0] == "-" or legs[0].lower().endswith((".csv", ".parquet"))):
+    if len(legs) == 1 and legs[0].lower().endswith(FILE_ENDINGS):
         from gough.files import read_legs
 
-        return read_legs(legs[0], platform)
+        return read_legs(legs[0], platform, reading_options(name))
     return six_numbers("LEGS", legs, "readings or a .csv or .parquet file")
 
 

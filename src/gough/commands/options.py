@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
 if TYPE_CHECKING:
     from gough.files import Reading
+
+
+# names of files to read; "-" is standard input
+FILE_ENDINGS = (".csv", ".parquet", ".txt", ".tsv", ".dat", ".log", ".gz", "-")
 
 
 def option(text: str | None = None, metavar: str | None = None, **settings: Any) -> Any:
@@ -54,11 +59,49 @@ Head = Annotated[int, arg(metavar="N", help="Print this many rows where no file 
 BlockRows = Annotated[int, arg(metavar="N", help="Hold this many rows in memory at a time.")]
 
 
+@dataclass(frozen=True)
+class LogOptions:
+    """The form of leg readings in a file; options go before the platform file's [readings]."""
+
+    columns: Annotated[
+        str,
+        option(
+            "Read legs 1 to 6 from these columns: 1:6, six names in order, or NAME=LEG,... "
+            "Without it they are found by names such as leg_1, L1 or actuator 1 (mm).",
+            "COLUMNS",
+        ),
+    ] = ""
+    unit: Annotated[
+        str,
+        option("Convert readings from this unit of length: m, cm, mm, um, in or ft.", "UNIT"),
+    ] = ""
+    angle_unit: Annotated[
+        Literal["deg", "rad"] | None, option("Read motor angles in this unit.", "deg|rad")
+    ] = None
+    scale: Annotated[
+        str,
+        option("Multiply the values by this number, or by six numbers separated by commas.", "S"),
+    ] = ""
+    offset: Annotated[
+        str, option("Then add this number, or six numbers, in the readings' unit.", "B")
+    ] = ""
+    decimal: Annotated[
+        Literal[".", ","] | None, option("Read numbers with this decimal sign.", ".|,")
+    ] = None
+
+
 def reading_options(
-    keep: str, keep_bad_rows: bool, ignore_platform: bool, block_rows: int
+    platform: str,
+    keep: str = "",
+    keep_bad_rows: bool = False,
+    ignore_platform: bool = False,
+    block_rows: int = 65536,
+    log: LogOptions = LogOptions(),
 ) -> Reading:
-    """The options for reading a file, from the text of the command line."""
+    """The options for reading a file, from the platform's file and the text of the command line."""
     from gough.files import Reading
+    from gough.files.log_format import LogFormat
 
     names = tuple(name.strip() for name in keep.split(",") if name.strip())
-    return Reading(names, keep_bad_rows, ignore_platform, block_rows)
+    form = LogFormat.of(platform, **vars(log))
+    return Reading(names, keep_bad_rows, ignore_platform, block_rows, form)

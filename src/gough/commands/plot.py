@@ -78,7 +78,9 @@ def modes(legs: Legs = (), *, platform: PlatformName, out: Picture = None) -> in
     from gough.plot.modes import modes_figure
 
     machine = _machine(platform, out, "modes")
-    figure = modes_figure(assembly_modes(machine, readings(legs, machine).reshape(-1, 6)[0]))
+    figure = modes_figure(
+        assembly_modes(machine, readings(legs, machine, platform).reshape(-1, 6)[0])
+    )
     return _save(figure, machine, out, "modes")
 
 
@@ -158,7 +160,7 @@ def trajectory(
     from gough.plot.trajectory import note, trajectory_figure
 
     machine = _machine(platform, out, "trajectory")
-    reading = reading_options("", keep_bad_rows, ignore_platform, block_rows)
+    reading = reading_options(platform, "", keep_bad_rows, ignore_platform, block_rows)
     with _ticking() as tick:
         envelope = read_trajectory(file, machine, time=time, seed=seed, reading=reading, tick=tick)
     figure = trajectory_figure(machine, envelope, time=time or "row",
@@ -201,7 +203,7 @@ def errors(
     if not files:
         raise InputError("FILE: expected a .csv or .parquet file that gough solve wrote")
     machine = _machine(platform, out, "errors")
-    reading = reading_options("", keep_bad_rows, ignore_platform, block_rows)
+    reading = reading_options(platform, "", keep_bad_rows, ignore_platform, block_rows)
     unit = length_unit(machine)
     labels = {
         "residual": f"residual: largest leg error [{unit}]",

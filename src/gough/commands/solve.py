@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from gough.commands.options import (
     AllowFailures,
@@ -13,6 +13,7 @@ from gough.commands.options import (
     IgnorePlatform,
     Keep,
     KeepBadRows,
+    LogOptions,
     Out,
     PlatformName,
     option,
@@ -37,6 +38,7 @@ def run(
     ignore_platform: IgnorePlatform = False,
     head: Head = 5,
     block_rows: BlockRows = 65536,
+    log: OmitArgPrefixes[LogOptions] = LogOptions(),  # noqa: B008 - frozen
 ) -> int:
     """Calculate poses from a file of leg readings.
 
@@ -47,8 +49,8 @@ def run(
     Exit code 0: all poses are usable; 1: some are not; 2: nothing was written.
 
     Args:
-        legs: Read this .csv or .parquet file with columns leg_1 to leg_6, or CSV from standard
-            input (-).
+        legs: Read the columns of the six legs from this file, .csv, .txt, .tsv or .parquet, or
+            from standard input (-).
         seed: Start from this first guess: home, polynomial, polynomial-5 (another degree), the
             name of a network that comes with gough, or the folder of a trained one. auto is
             polynomial where the platform states a workspace, else home.
@@ -69,7 +71,9 @@ def run(
     with show.progress_bar() as progress:
         report = solve_file(
             legs, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
-            reading=reading_options(keep, keep_bad_rows, ignore_platform, block_rows),
+            reading=reading_options(
+                platform, keep, keep_bad_rows, ignore_platform, block_rows, log
+            ),
             head=0 if out else head, seed=seed, tol=tolerance, max_iterations=max_iterations,
             workers=workers,
         )  # fmt: skip

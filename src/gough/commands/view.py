@@ -66,10 +66,10 @@ def run(
         check_target(html)
     rows_of_file = None
     if file is not None:
-        from gough.files import Reading
+        from gough.commands.options import reading_options
         from gough.view.trajectory import read
 
-        reading = Reading((), keep_bad_rows, ignore_platform)
+        reading = reading_options(platform, "", keep_bad_rows, ignore_platform)
         rows_of_file = read(file, machine, rows=rows, time=time, reading=reading)
         print(rows_of_file.about, flush=True)
     if html is not None:

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from gough.files.convert import inverse_file, solve_file
 from gough.files.formats import open_source, read_legs, write_table
+from gough.files.log_format import LogFormat
 from gough.files.report import Report
 from gough.files.rows import Reading
 
 __all__ = [
+    "LogFormat",
     "Reading",
     "Report",
     "inverse_file",

@@ -18,14 +18,16 @@ from gough.columns import (
     Angles,
     check_kept,
     checked,
-    leg_columns,
+    file_leg_columns,
     pose_columns,
     solution_names,
 )
 from gough.errors import GoughError
 from gough.files.formats import STANDARD, file_format, open_sink, open_source
-from gough.files.metadata import check_same, describe
+from gough.files.log_format import LogFormat
+from gough.files.metadata import describe
 from gough.files.placing import INVALID, PLACED, placed
+from gough.files.plausible import check_plausible
 from gough.files.report import Report
 from gough.files.rows import Block, Reading, Sink, Source
 from gough.fk.solution import solution_columns
@@ -79,12 +81,13 @@ def solve_file(
     solver = partial(solve, platform, leg_noise=leg_noise, **options)  # pyright: ignore[reportArgumentType]
     report = Report(tuple(Status), head)
     written = solution_names(angles, leg_noise is not None, bool(options.get("certify")))
-    with _open_job(legs, out, platform, reading, leg_columns, written) as job:
+    with _open_job(legs, out, platform, reading, file_leg_columns, written) as job:
         for block in job.blocks:
+            readings = block.numbers(LEGS)
             if report.rows == 0:
+                check_plausible(job.source.where, platform, readings, reading.log)
                 solver(platform.home_legs)  # compiles
                 report.start()
-            readings = block.numbers(LEGS)
             solution = solver(readings)
             report.add(solution.pose, readings, solution.status, solution.residual)
             invalid = solution.status == Status.INVALID_INPUT
@@ -110,7 +113,7 @@ def inverse_file(
         poses: .csv or .parquet with columns x, y, z and qw, qx, qy, qz, or rx, ry, rz [rad], or
             rx_deg, ry_deg, rz_deg (R = Rx Ry Rz), or "-" for standard input.
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones,
-            leg_1 to leg_6 and status.
+            leg_1 to leg_6 and status; in text the readings have the form `reading.log`.
         platform, reading, head, progress: as for `solve_file`.
 
     Raises:
@@ -118,7 +121,12 @@ def inverse_file(
     """
     report = Report(PLACED, head)
     labels = [outcome.label for outcome in PLACED]
-    with _open_job(poses, out, platform, reading, pose_columns, (*LEGS, STATUS)) as job:
+    # Parquet states its platform; text is written as logs of this machine are
+    text = out is not None and file_format(out) == ".csv"
+    form = reading.log if text else LogFormat()
+    factor, offset, _ = form.conversion(platform, [""] * 6)
+    written = (*form.names, STATUS)
+    with _open_job(poses, out, platform, reading, pose_columns, written) as job:
         for block in job.blocks:
             pose, fault = poses_from_columns(block.numbers(job.numbers), job.numbers)
             with np.errstate(invalid="ignore"):
@@ -126,7 +134,8 @@ def inverse_file(
             status = placed(platform, pose, legs)
             report.add(pose, legs, status)
             report.describe_invalid(block, status == INVALID, fault)
-            columns = dict(zip(LEGS, map(number_column, legs.T), strict=True))
+            values = ((legs - offset) / factor).T if text else legs.T
+            columns = dict(zip(form.names, map(number_column, values), strict=True))
             job.write(block, columns | {STATUS: label_column(status, labels)})
             if progress:
                 progress(job.source, report)
@@ -173,11 +182,9 @@ def _open_job(
     _check_paths(path, out)
     check_kept(reading.keep, written)
     with ExitStack() as stack:
-        source = stack.enter_context(closing(open_source(path)))
+        source = stack.enter_context(closing(open_source(path, platform, reading)))
         numbers = pick(source.where, source.columns)
         keep = checked(source.where, source.columns, tuple(dict.fromkeys(reading.keep)))
-        if not reading.ignore_platform:
-            check_same(source.where, source.metadata, platform)
         sink = stack.enter_context(open_sink(out, describe(platform))) if out else None
         blocks = source.blocks(
             numbers,
@@ -191,7 +198,7 @@ def _open_job(
 
 def _check_paths(path: str | Path, out: str | Path | None) -> None:
     """Raise for a name of no known format, and for an output that is the input."""
-    file_format(path)
+    file_format(path, read=True)
     if out is None:
         return
     file_format(out)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import sys
+import zlib
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import BinaryIO
@@ -14,44 +16,61 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from gough.errors import GoughError, InputError
-from gough.files.rows import Block
+from gough.files.layout import BLANKS, as_utf8, check_text, find_layout
+from gough.files.log_format import LogFormat
+from gough.files.rows import Block, Conversions
 
 HEAD = 1 << 16  # bytes read to find the header
 LONGEST_LINE = 1 << 24  # bytes; a "line" beyond it means wrong line ends or an open quote
-DELIMITERS = (",", ";", "\t", "|")
-COMPRESSED = {
-    b"\x1f\x8b": "gzip",
-    b"(\xb5/\xfd": "zstd",
-    b"BZh": "bzip2",
-    b"\xfd7zXZ": "xz",
-}
 # text that stands for "no value" in a number column
 MISSING = ("", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
 
 
 class CsvSource:
-    """Rows of a CSV file: a header line, then fields separated by comma, semicolon, tab or bar.
+    """Rows of a text file: a header line, then fields separated by comma, semicolon, tab or blanks.
 
     See `Source`; `total` and `done` count bytes, `total` is None for a pipe, `metadata` is empty.
 
     Raises:
-        InputError: the file is empty, is not CSV text, or has a header and no rows.
+        InputError: the file is empty, is not text, or has a header and no rows.
     """
 
-    def __init__(self, file: BinaryIO, where: str, total: int | None) -> None:
-        self.where, self.total, self.done = where, total, 0
-        self.metadata: dict[str, str] = {}
-        self._file = file
+    def __init__(
+        self,
+        file: BinaryIO,
+        where: str,
+        total: int | None,
+        log: LogFormat = LogFormat(),  # noqa: B008
+    ) -> None:
+        self.where, self.done, self.metadata = where, 0, {}
+        self.conversions: Conversions = {}
+        self._given = file
+        try:
+            self._file, recoded = as_utf8(file)
+        except (OSError, EOFError, zlib.error) as error:
+            raise InputError(f"{where}: is damaged or no gzip file: {error}") from None
+        self.total = None if recoded else total
         start = self._read(HEAD)
-        _check_text(where, start)
-        header, self._rest = self._split_header(start.removeprefix(b"\xef\xbb\xbf"))
-        self.columns, self._delimiter = _read_header(where, header)
-        self._first_line = 1 + header.count(b"\n")
+        check_text(where, start)
+        ended = len(start) < HEAD
+        start = start.removeprefix(b"\xef\xbb\xbf")
+        while not ended and not _last_line_end(start, len(start)):
+            more = self._read(HEAD)
+            start, ended = start + more, not more
+            if len(start) > LONGEST_LINE:
+                raise InputError(f"{where}: line 1 has no end; expected lines of text")
+        whole = start if ended else start[: _last_line_end(start, len(start))]
+        self.layout = find_layout(where, whole, log)
+        self.columns, self.units = self.layout.names, self.layout.units
+        self._rest = start[self.layout.size :]
         while not self._rest.strip():
             more = self._read(HEAD)
             if not more:
                 raise InputError(f"{where}: holds a header and no rows; expected a row per pose")
             self._rest += more
+
+    def rename(self, names: list[str]) -> None:
+        self.columns = names
 
     def blocks(
         self,
@@ -77,33 +96,24 @@ class CsvSource:
 
     def close(self) -> None:
         """Close the file; standard input stays open."""
-        if self._file is not sys.stdin.buffer:
+        if self._given is not sys.stdin.buffer:
             self._file.close()
+            self._given.close()
 
     # ---- bytes to lines ---------------------------------------------------------------
 
     def _read(self, count: int) -> bytes:
         try:
             data = self._file.read(count)
-        except OSError as error:
-            raise InputError(f"{self.where}: cannot be read: {error.strerror}") from None
+        except (OSError, EOFError, zlib.error) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{self.where}: cannot be read: {reason}") from None
         self.done += len(data)
         return data
 
-    def _split_header(self, start: bytes) -> tuple[bytes, bytes]:
-        """The header line with its end, and the bytes after it."""
-        while (end := _first_line_end(start)) == 0:
-            more = self._read(HEAD)
-            if not more:
-                return start, b""
-            start += more
-            if len(start) > LONGEST_LINE:
-                raise InputError(f"{self.where}: line 1 has no end; expected lines of text")
-        return start[:end], start[end:]
-
     def _chunks(self, rows: int) -> Iterator[tuple[int, bytes]]:
         """(number of the first line, whole lines) until the end of the file."""
-        line, rest = self._first_line, self._rest
+        line, rest = 1 + self.layout.lines, self._rest
         per_row = (rest.find(b"\n") + 1) or len(rest)
         size = max(rows * per_row, 1 << 8)
         while data := rest + (self._read(size - len(rest)) if len(rest) < size else b""):
@@ -131,18 +141,22 @@ class CsvSource:
         pyarrow reads them fast, but names no line, or the wrong one, where it cannot; such a
         block is read again row by row.
         """
+        delimiter = self.layout.delimiter
+        if delimiter == BLANKS:
+            data, delimiter = _tabbed(data), "\t"
         try:
             table = pacsv.read_csv(
                 pa.BufferReader(data),
                 read_options=pacsv.ReadOptions(column_names=self.columns),
                 parse_options=pacsv.ParseOptions(
-                    delimiter=self._delimiter, newlines_in_values=b'"' in data
+                    delimiter=delimiter, newlines_in_values=b'"' in data
                 ),
                 convert_options=pacsv.ConvertOptions(
                     column_types=types,
                     include_columns=list(types),
                     null_values=MISSING,
                     strings_can_be_null=False,
+                    decimal_point=self.layout.decimal,
                 ),
             )
         except pa.ArrowInvalid:
@@ -151,7 +165,7 @@ class CsvSource:
         def place(row: int) -> str:
             return f"line {next(islice(self._fields(data, line), row, None))[0]}"
 
-        return Block(table, place)
+        return Block(table, place, conversions=self.conversions)
 
     def _block_row_by_row(
         self, data: bytes, line: int, types: dict[str, pa.DataType], keep_bad: bool
@@ -164,6 +178,8 @@ class CsvSource:
             if len(fields) != len(self.columns):
                 count = f"{len(fields)} field{'s' * (len(fields) != 1)}"
                 bad[len(rows)] = f"found {count}, expected {len(self.columns)} as in the header"
+                if self.layout.delimiter == "," and len(fields) > 1.5 * len(self.columns):
+                    bad[len(rows)] += " (write decimal points, or semicolons between the fields)"
                 fields = [""] * len(self.columns)
             lines.append(number)
             rows.append(fields)
@@ -173,7 +189,7 @@ class CsvSource:
             values: list = [_absent(kind)] * len(rows)
             for row, fields in enumerate(rows):
                 try:
-                    values[row] = _value(fields[place], kind)
+                    values[row] = _value(fields[place], kind, self.layout.decimal)
                 except ValueError:
                     bad.setdefault(row, f"column {name}: {_complaint(fields[place], kind)}")
             columns[name] = pa.array(values, kind)
@@ -182,7 +198,8 @@ class CsvSource:
                 f"{self.where}: line {lines[min(bad)]}: {bad[min(bad)]}; correct the row, or pass "
                 "--keep-bad-rows"
             )
-        return Block(pa.table(columns), lambda row: f"line {lines[row]}", dict(sorted(bad.items())))
+        bad = dict(sorted(bad.items()))
+        return Block(pa.table(columns), lambda row: f"line {lines[row]}", bad, self.conversions)
 
     def _fields(self, data: bytes, line: int) -> Iterator[tuple[int, list[str]]]:
         """(line, fields) of every row that is not empty.
@@ -190,8 +207,11 @@ class CsvSource:
         Raises:
             InputError: a quoted field without an end.
         """
+        delimiter = self.layout.delimiter
+        if delimiter == BLANKS:
+            data, delimiter = _tabbed(data), "\t"
         text = io.StringIO(data.decode("utf-8", errors="surrogateescape"), newline="")
-        reader = csv.reader(text, delimiter=self._delimiter, strict=True)
+        reader = csv.reader(text, delimiter=delimiter, strict=True)
         number = line
         try:
             for fields in reader:
@@ -255,7 +275,7 @@ def _absent(kind: pa.DataType) -> object:
     return "" if pa.types.is_string(kind) else None
 
 
-def _value(text: str, kind: pa.DataType) -> object:
+def _value(text: str, kind: pa.DataType, decimal: str) -> object:
     """The value of a field.
 
     Raises:
@@ -270,7 +290,7 @@ def _value(text: str, kind: pa.DataType) -> object:
     if "_" in bare or not bare.isascii():  # Python reads 1_000 as a number, CSV files do not
         raise ValueError
     if pa.types.is_floating(kind):
-        return float(bare)
+        return float(bare if decimal == "." else bare.replace(".", "_.").replace(",", "."))
     number = int(bare)
     if not -(1 << 63) <= number < 1 << 63:
         raise ValueError
@@ -302,17 +322,6 @@ def _number_type(text: pa.ChunkedArray) -> pa.DataType:
     return pa.string()
 
 
-# ---- header ---------------------------------------------------------------------------
-
-
-def _first_line_end(data: bytes) -> int:
-    """End of the first line that does not end inside quotation marks, or 0."""
-    end = 0
-    while (end := data.find(b"\n", end) + 1) and data.count(b'"', 0, end) % 2:
-        pass
-    return end
-
-
 def _last_line_end(data: bytes, limit: int) -> int:
     """End of the last line before `limit` that does not end inside quotation marks, or 0."""
     end = data.rfind(b"\n", 0, limit) + 1
@@ -326,52 +335,7 @@ def _last_line_end(data: bytes, limit: int) -> int:
     return end
 
 
-def _check_text(where: str, start: bytes) -> None:
-    """Raise unless a file begins like CSV text.
-
-    Raises:
-        InputError: empty, Parquet, compressed, UTF-16 or another binary file.
-    """
-    if not start.strip():
-        raise InputError(f"{where}: is empty; expected a header line and a row per pose")
-    if start.startswith(b"PAR1"):
-        raise InputError(f"{where}: holds Parquet, not CSV; rename it to end in .parquet")
-    for magic, name in COMPRESSED.items():
-        if start.startswith(magic):
-            raise InputError(f"{where}: is compressed ({name}); unpack it first")
-    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise InputError(f"{where}: is UTF-16 text; save it as UTF-8")
-    if b"\0" in start:
-        raise InputError(f"{where}: holds binary data, not CSV text")
-
-
-def _read_header(where: str, header: bytes) -> tuple[list[str], str]:
-    """Column names and delimiter."""
-    try:
-        text = header.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{where}: line 1: byte {error.start + 1} is not UTF-8 text; save the file as UTF-8"
-        ) from None
-    text = text.rstrip("\r\n")
-    if "\r" in text:
-        raise InputError(f"{where}: its lines end in CR alone; save it with LF or CRLF line ends")
-    delimiter = max(DELIMITERS, key=text.count)
-    try:
-        fields = next(csv.reader([text], delimiter=delimiter, strict=True), [])
-    except csv.Error as error:
-        raise InputError(f"{where}: line 1: {error}; expected column names") from None
-    names = [name.strip() for name in fields]
-    if names and all(map(_is_number, names)):
-        raise InputError(
-            f"{where}: line 1 holds numbers; put a line with the names of the columns above it"
-        )
-    return names, delimiter
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _tabbed(data: bytes) -> bytes:
+    """Lines with a tab for each run of blanks, and none at their ends."""
+    data = re.sub(rb"^[ \t]+|[ \t]+(?=\r?$)", b"", data, flags=re.MULTILINE)
+    return re.sub(rb"[ \t]+", b"\t", data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Iterator, Mapping
@@ -13,46 +14,121 @@ import numpy as np
 import pyarrow as pa
 
 from gough.checks import Array
-from gough.columns import LEGS, leg_columns
+from gough.columns import LEGS, POSITION, file_leg_columns
 from gough.errors import GoughError, InputError
 from gough.files.csv import CsvSink, CsvSource
+from gough.files.log_format import LogFormat, split_unit
 from gough.files.metadata import check_same, describe
 from gough.files.parquet import ParquetSink, ParquetSource
+from gough.files.plausible import check_plausible
 from gough.files.rows import Reading, Sink, Source
 from gough.platform import Platform
 from gough.whole_file import explain, replacing
 
 STANDARD = "-"  # standard input or output, as CSV
 FORMATS = (".csv", ".parquet")
+TEXT = (".txt", ".tsv", ".dat", ".log", ".gz")  # read as CSV
+log = logging.getLogger("gough")
 
 
-def file_format(path: str | Path) -> str:
+def file_format(path: str | Path, *, read: bool = False) -> str:
     """The format that a name stands for, ".csv" or ".parquet".
 
+    Args:
+        path: name of a file, or "-".
+        read: True for a file to read, which may be any text file.
+
     Raises:
-        GoughError: the name ends in neither.
+        GoughError: another ending.
     """
-    if str(path) == STANDARD:
-        return ".csv"
     ending = Path(path).suffix.lower()
+    if str(path) == STANDARD or (read and ending in TEXT):
+        return ".csv"
     if ending not in FORMATS:
+        text = f" (or {', '.join(TEXT)} for text)" if read else ""
         raise GoughError(
-            f"{path}: the name must end in .csv or .parquet, or be - for CSV on standard input or "
-            "output"
+            f"{path}: the name must end in .csv or .parquet{text}, or be - for CSV on standard "
+            f"{'input' if read else 'output'}"
         )
     return ending
 
 
-def open_source(path: str | Path) -> Source:
+def open_source(
+    path: str | Path,
+    platform: Platform | None = None,
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+) -> Source:
     """Open a file of rows to read, or standard input for "-".
+
+    For a platform the six leg columns are called leg_1 to leg_6, whatever the file calls them,
+    and their readings are converted to the platform's unit.
+
+    Args:
+        path: .csv, another text file, or .parquet, or "-".
+        platform: the machine whose readings or poses these are.
+        reading: options for reading the file.
 
     Raises:
         GoughError: a name of no known format.
-        InputError: no such file, or one that cannot be read.
+        InputError: no such file, one that cannot be read, or one of another platform.
     """
-    ending = file_format(path)
+    source = _open(path, reading)
+    if platform is None:
+        return source
+    # a file that gough wrote is in the platform's unit
+    form = LogFormat() if "gough.geometry" in source.metadata else reading.log
+    try:
+        if not reading.ignore_platform:
+            check_same(source.metadata, platform)
+        notes = _name_legs(source, platform, form)
+    except InputError as error:
+        source.close()
+        raise InputError(f"{source.where}: {error}") from None
+    if isinstance(source, CsvSource):
+        notes += source.layout.notes(form)
+    if notes:
+        log.warning("%s: %s", source.where, "; ".join(notes))
+    return source
+
+
+def _name_legs(source: Source, platform: Platform, form: LogFormat) -> list[str]:
+    """Name the leg columns of a source, set their conversions, and return notes for the user.
+
+    Raises:
+        InputError: given columns that are not there, or a unit that cannot be converted.
+    """
+    found = source.columns
+    has_pose = all(name in found for name in POSITION)
+    if has_pose and not isinstance((*form.columns, "")[0], str):
+        return []  # columns by number are those of logs, not of files with poses
+    places = form.find(found)
+    if not places:
+        if form.columns and not has_pose:
+            wanted = ", ".join(map(str, form.columns))
+            raise InputError(f"no columns {wanted}; the columns are {', '.join(found)}")
+        return []
+    names = [f"{name} (not used)" if name in LEGS else name for name in found]
+    for leg, place in zip(LEGS, places, strict=True):
+        names[place] = leg
+    source.rename(names)
+    units = [split_unit(found[place])[1] or source.units[place] for place in places]
+    factor, offset, unit = form.conversion(platform, units)
+    if np.any(factor != 1) or np.any(offset != 0):
+        pairs = zip(factor.tolist(), offset.tolist(), strict=True)
+        source.conversions = dict(zip(LEGS, pairs, strict=True))
+    notes = []
+    if [found[place] for place in places] != list(LEGS) and not form.columns:
+        notes.append(f"{', '.join(found[place] for place in places)} are read as leg_1 to leg_6")
+    target = "rad" if platform.legs == "rotary" else platform.unit
+    if unit not in (target, form.unit, form.angle_unit):
+        notes.append(f"readings are converted from [{unit}] to [{target}]")
+    return notes
+
+
+def _open(path: str | Path, reading: Reading) -> Source:
+    ending = file_format(path, read=True)
     if str(path) == STANDARD:
-        return CsvSource(sys.stdin.buffer, "standard input", None)
+        return CsvSource(sys.stdin.buffer, "standard input", None, reading.log)
     try:
         file = open(path, "rb")  # noqa: SIM115 - the source closes it
     except IsADirectoryError:
@@ -63,7 +139,7 @@ def open_source(path: str | Path) -> Source:
         if ending == ".parquet":
             return ParquetSource(file, str(path))
         size = os.fstat(file.fileno()).st_size
-        return CsvSource(file, str(path), size or None)
+        return CsvSource(file, str(path), size or None, reading.log)
     except BaseException:
         file.close()
         raise
@@ -111,22 +187,28 @@ def _standard_output() -> Iterator[BinaryIO]:
         raise GoughError(f"standard output: {explain(error)}") from None
 
 
-def read_legs(path: str | Path, platform: Platform) -> Array:
+def read_legs(
+    path: str | Path,
+    platform: Platform,
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+) -> Array:
     """Read all leg readings (N, 6) of a file, NaN where a value is absent.
 
     Args:
         path: .csv or .parquet with columns leg_1 to leg_6, or "-".
         platform: the machine that the readings belong to.
+        reading: options for reading the file.
 
     Raises:
         GoughError: a name of no known format.
         InputError: a file that cannot be read, or one of another platform.
     """
-    with closing(open_source(path)) as source:
-        columns = leg_columns(source.where, source.columns)
-        check_same(source.where, source.metadata, platform)
-        blocks = source.blocks(columns, rows=Reading().block_rows)
-        return np.concatenate([block.numbers(LEGS) for block in blocks])
+    with closing(open_source(path, platform, reading)) as source:
+        columns = file_leg_columns(source.where, source.columns)
+        blocks = source.blocks(columns, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
+        legs = np.concatenate([block.numbers(LEGS) for block in blocks])
+        check_plausible(source.where, platform, legs, reading.log)
+        return legs
 
 
 def write_table(path: str | Path, columns: Mapping[str, pa.Array], platform: Platform) -> None:

@@ -36,7 +36,7 @@ def describe(platform: Platform) -> dict[str, str]:
     }
 
 
-def check_same(where: str, metadata: Mapping[str, str], platform: Platform) -> None:
+def check_same(metadata: Mapping[str, str], platform: Platform) -> None:
     """Raise if a file was written for another platform; a file that names none passes.
 
     Raises:
@@ -46,12 +46,12 @@ def check_same(where: str, metadata: Mapping[str, str], platform: Platform) -> N
     override = "pass that platform with -p, or --ignore-platform to take the numbers as they are"
     if unit is not None and unit != platform.unit:
         raise InputError(
-            f"{where}: its lengths are in [{unit}] (platform {name!r}), those of platform "
+            f"its lengths are in [{unit}] (platform {name!r}), those of platform "
             f"{platform.name!r} in [{platform.unit}]; {override}"
         )
     geometry = metadata.get("gough.geometry")
     if geometry is not None and geometry != geometry_digest(platform):
         whose = f"platform {name!r}" if name != platform.name else "another geometry"
         raise InputError(
-            f"{where}: was written for {whose}, not for {platform.name!r} as it is now; {override}"
+            f"was written for {whose}, not for {platform.name!r} as it is now; {override}"
         )

@@ -43,6 +43,8 @@ class ParquetSource:
             raise InputError(f"{where}: {_not_parquet(file, error)}") from None
         self._schema = self._file.schema_arrow
         self.columns: list[str] = list(self._schema.names)
+        self.units, self.conversions = [""] * len(self.columns), {}
+        self._stored = {name: name for name in self.columns}  # names in the file
         raw = self._file.metadata.metadata or {}
         self.metadata = {k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()}
         self.total: int | None = self._file.metadata.num_rows
@@ -61,12 +63,19 @@ class ParquetSource:
         for name in numbers:
             self._check_number(name)
         wanted = list(dict.fromkeys([*keep, *numbers]))
-        batches = self._file.iter_batches(batch_size=rows, columns=wanted)
+        stored = [self._stored[name] for name in wanted]
+        batches = self._file.iter_batches(batch_size=rows, columns=stored)
         while (batch := self._next(batches)) is not None:
             first = self.done + 1
             self.done += len(batch)
-            table = pa.Table.from_batches([batch])
-            yield Block(table, lambda row, first=first: f"row {first + row}")
+            table = pa.Table.from_batches([batch]).select(stored).rename_columns(wanted)
+            yield Block(
+                table, lambda row, first=first: f"row {first + row}", conversions=self.conversions
+            )
+
+    def rename(self, names: list[str]) -> None:
+        self._stored = dict(zip(names, self._schema.names, strict=True))
+        self.columns = names
 
     def close(self) -> None:
         """Close the file."""
@@ -83,8 +92,8 @@ class ParquetSource:
             ) from None
 
     def _check_number(self, name: str) -> None:
-        kind = self._schema.field(name).type
-        first = self._next(self._file.iter_batches(batch_size=1, columns=[name]))
+        kind = self._schema.field(self._stored[name]).type
+        first = self._next(self._file.iter_batches(batch_size=1, columns=[self._stored[name]]))
         value = first.column(0)[0].as_py() if first is not None and len(first) else None
         check_number(self.where, name, kind, value)
 

@@ -11,7 +11,10 @@ import pyarrow as pa
 
 from gough.checks import Array
 from gough.errors import GoughError
+from gough.files.log_format import LogFormat
 from gough.tables import arrow_values
+
+Conversions = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -24,12 +27,14 @@ class Reading:
             fields, as invalid instead of raising an error.
         ignore_platform: accept a file that was written for another platform.
         block_rows: rows held in memory at a time.
+        log: the form of the leg readings.
     """
 
     keep: tuple[str, ...] = ()
     keep_bad_rows: bool = False
     ignore_platform: bool = False
     block_rows: int = 65536
+    log: LogFormat = field(default_factory=LogFormat)
 
     def __post_init__(self) -> None:
         if self.block_rows < 1:
@@ -44,11 +49,13 @@ class Block:
         table: number columns, with gaps where fields are empty; kept columns as they were read.
         place: gives the place in the file of row i (from 0) of the block, such as "line 17".
         bad: reason for each row that could not be read.
+        conversions: factor and offset of the columns that are converted.
     """
 
     table: pa.Table
     place: Callable[[int], str]
     bad: dict[int, str] = field(default_factory=dict)
+    conversions: Conversions = field(default_factory=dict)
 
     def __len__(self) -> int:
         return self.table.num_rows
@@ -59,6 +66,10 @@ class Block:
         Absent values are NaN, and so are all values of a row that could not be read.
         """
         array = np.stack([arrow_values(self.table.column(name)) for name in names], axis=-1)
+        for i, name in enumerate(names):
+            if name in self.conversions:
+                factor, offset = self.conversions[name]
+                array[:, i] = factor * array[:, i] + offset
         array[list(self.bad)] = np.nan
         return array
 
@@ -68,7 +79,8 @@ class Source(Protocol):
 
     Attributes:
         where: name of the file for messages.
-        columns: names of its columns.
+        columns, units: names of its columns, and units that stand below them.
+        conversions: factor and offset of the columns to convert.
         metadata: text that the file carries, such as the platform it belongs to.
         total, done: size of the file and how much of it has been read, in the same unit; total
             is None where it is not known.
@@ -76,6 +88,8 @@ class Source(Protocol):
 
     where: str
     columns: list[str]
+    units: list[str]
+    conversions: Conversions
     metadata: dict[str, str]
     total: int | None
     done: int
@@ -101,6 +115,10 @@ class Source(Protocol):
         Raises:
             InputError: a value that is no number, or a damaged file; with its place.
         """
+        ...
+
+    def rename(self, names: list[str]) -> None:
+        """Give the columns other names."""
         ...
 
     def close(self) -> None:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from gough.checks import Array
 from gough.columns import LEGS, STATUS, checked, pose_or_leg_columns
 from gough.files.formats import open_source
-from gough.files.metadata import check_same
 from gough.files.placing import PLACED, placed
+from gough.files.plausible import check_plausible
 from gough.files.rows import Block, Reading, Source
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
@@ -95,6 +95,9 @@ class TrajectoryFile:
                 rows[:, 1] = block.numbers([time])[:, 0]
             rows[:, 2] = unusable_status(block)
             rows[:, 3:] = block.numbers(self.columns)
+            if count == 0 and not self.has_poses:
+                where, log = self.source.where, self.reading.log
+                check_plausible(where, self.platform, rows[:, 3:], log)
             count += len(block)
             yield rows
             if progress:
@@ -151,10 +154,8 @@ def open_trajectory(
         GoughError: a name of no known format.
         InputError: a file that cannot be read, or without the columns.
     """
-    with closing(open_source(path)) as source:
+    with closing(open_source(path, platform, reading)) as source:
         columns = pose_or_leg_columns(source.where, source.columns)
-        if not reading.ignore_platform:
-            check_same(source.where, source.metadata, platform)
         if time is not None:
             checked(source.where, source.columns, (time,))
         yield TrajectoryFile(source, platform, columns, time, seed, reading)

@@ -12,7 +12,6 @@ from gough.checks import Array
 from gough.columns import pose_columns
 from gough.errors import InputError
 from gough.files.formats import open_source
-from gough.files.metadata import check_same
 from gough.files.rows import Reading, Source
 from gough.files.trajectory import (
     Trajectory,
@@ -92,7 +91,7 @@ def read_errors(
             residuals nor a truth.
     """
     with ExitStack() as stack:
-        source = stack.enter_context(closing(open_source(path)))
+        source = stack.enter_context(closing(open_source(path, platform, reading)))
         residual = (RESIDUAL,) if RESIDUAL in source.columns else ()
         if truth is None and not residual:
             raise InputError(
@@ -103,10 +102,9 @@ def read_errors(
         found = {name: LogHistogram() for name in residual}
         true = None
         if truth is not None:
-            true = _Feed(stack.enter_context(closing(open_source(truth))), platform, reading)
+            opened = stack.enter_context(closing(open_source(truth, platform, reading)))
+            true = _Feed(opened, reading)
             found |= {"shift": LogHistogram(), "turn": LogHistogram()}
-        if not reading.ignore_platform:
-            check_same(source.where, source.metadata, platform)
         for block in read_columns(source, (*names, *residual), reading):
             answered = (unusable_status(block) < 0) | all_rows
             if residual:
@@ -164,11 +162,9 @@ def _times(file: TrajectoryFile, rows: Trajectory) -> Array:
 class _Feed:
     """Poses of a file, as many at a time as are asked for."""
 
-    def __init__(self, source: Source, platform: Platform, reading: Reading) -> None:
+    def __init__(self, source: Source, reading: Reading) -> None:
         self._where = source.where
         self._names = pose_columns(source.where, source.columns)
-        if not reading.ignore_platform:
-            check_same(source.where, source.metadata, platform)
         self._blocks = read_columns(source, self._names, reading)
         self._values: Array = np.empty((0, len(self._names)))
 
