@@ -89,7 +89,7 @@ def test_every_mode_has_the_readings(kind: str) -> None:
 def test_torch_agrees(kind: str) -> None:
     torch = pytest.importorskip("torch")
     import gough.learn
-    from gough.learn.graph import edge_lengths
+    from gough.learn.data import edge_lengths
 
     platform = machines.random_platform(5, kind, sensors=True)
     pose = support.sample(platform, (4,))

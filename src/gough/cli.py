@@ -16,7 +16,7 @@ from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
 EXTRAS = {"matplotlib": "plot", "viser": "view"} | dict.fromkeys(
-    ("torch", "safetensors", "onnx", "onnxscript", "tensorboard"), "learn"
+    ("torch", "roma", "safetensors", "onnx", "onnxscript", "scipy", "tensorboard"), "learn"
 )
 
 

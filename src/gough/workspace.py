@@ -65,7 +65,10 @@ class Workspace:
         for name, value in (("count", count), ("seed", seed)):
             if not isinstance(value, (int, np.integer)) or value < 0:
                 raise GoughError(f"{name}: expected a whole number of 0 or more, found {value!r}")
-        rng = np.random.default_rng(seed)
+        return self.draw(home, count, np.random.default_rng(seed))
+
+    def draw(self, home: Pose, count: int, rng: np.random.Generator) -> Pose:
+        """Draw the next poses of a random generator, batch (count,)."""
         translation = rng.uniform(*self.translation.T, size=(count, 3))
         angles = np.radians(rng.uniform(*self.rotation_deg.T, size=(count, 3)))
         rotation = quaternion.from_euler(angles)

@@ -17,8 +17,7 @@ from support import angles, random_platforms, random_twists, seeds
 import gough
 from gough import GoughError, Platform, Pose
 from gough.kinematics import equivalent_struts
-from gough.learn import se3
-from gough.learn.kinematics import TorchPlatform
+from gough.learn.kinematics import TorchPlatform, se3_exp, se3_exp_jacobian
 from gough.learn.newton import BatchedSolution, batched_newton, refine
 from gough.status import NewtonStatus
 
@@ -54,9 +53,9 @@ def test_the_jacobian_is_that_of_the_strut_lengths(
     struts = facts.equivalent_struts(legs)
 
     def lengths(x: torch.Tensor) -> torch.Tensor:
-        return facts.strut_errors(*se3.exp(x), *struts)[0]
+        return facts.strut_errors(*se3_exp(x), *struts)[0]
 
-    J = facts.strut_errors(*se3.exp(xi), *struts)[1] @ se3.exp_jacobian(xi)
+    J = facts.strut_errors(*se3_exp(xi), *struts)[1] @ se3_exp_jacobian(xi)
     expected = torch.autograd.functional.jacobian(lengths, xi)
     torch.testing.assert_close(J, expected, rtol=0, atol=1e-12 * float(expected.abs().max()))
 
@@ -136,10 +135,10 @@ def test_bad_rows_are_told_one_by_one_and_spoil_no_other() -> None:
     end = batched_newton(platform, guess, legs)
     for k in range(len(legs)):
         if k == 10:
-            assert end.outcome[k] != NewtonStatus.CONVERGED
+            assert end.status[k] != NewtonStatus.CONVERGED
         else:
-            assert end.outcome[k] == ends.get(k, NewtonStatus.CONVERGED), k
-    assert np.array_equal(end.singular, [k == 7 or end.outcome[k] == 2 for k in range(12)])
+            assert end.status[k] == ends.get(k, NewtonStatus.CONVERGED), k
+    assert np.array_equal(end.singular, [k == 7 or end.status[k] == 2 for k in range(12)])
     assert sum(end.counts().values()) == 12
     good = np.flatnonzero(end.converged)
     assert list(good) == [0, 2, 4, 6, 8, 11]
@@ -148,7 +147,7 @@ def test_bad_rows_are_told_one_by_one_and_spoil_no_other() -> None:
     assert np.array_equal(alone.pose.wxyz, end.pose.wxyz[good])
     assert np.array_equal(alone.iterations, end.iterations[good])
     assert np.isnan(end.residual[[1, 3, 9]]).tolist() == [True, True, True]
-    invalid = end.outcome == NewtonStatus.INVALID_INPUT
+    invalid = end.status == NewtonStatus.INVALID_INPUT
     assert np.array_equal(np.isnan(end.pose.position).all(axis=-1), invalid)
     assert np.array_equal(np.isnan(end.pose.wxyz).all(axis=-1), invalid)
 
@@ -159,7 +158,7 @@ def test_a_row_that_runs_away_is_stopped() -> None:
     _, legs, guess = problem(platform, count=2)
     far = guess.position + np.array([[0, 0, 1e5 * platform.size], [0, 0, 0]])
     end = batched_newton(platform, Pose(far, guess.wxyz), legs, f_max=200, scaled=True)
-    assert list(end.outcome) == [NewtonStatus.DIVERGED, NewtonStatus.CONVERGED]
+    assert list(end.status) == [NewtonStatus.DIVERGED, NewtonStatus.CONVERGED]
     assert end.iterations[0] == 0
     np.testing.assert_allclose(end.pose.position[0], far[0], rtol=0, atol=1e-8)
 
@@ -179,14 +178,14 @@ def test_limits_are_kept() -> None:
     platform = reference()
     _, legs, guess = problem(platform, off=1e-2)
     short = batched_newton(platform, guess, legs, z_max=1)
-    assert (short.outcome == NewtonStatus.NOT_CONVERGED).all()
+    assert (short.status == NewtonStatus.NOT_CONVERGED).all()
     assert (short.iterations == 1).all()
     assert short.sweeps == 1
     none = batched_newton(platform, guess, legs, z_max=0)
     assert_at(platform, none, guess, 1e-13)
     assert none.sweeps == 0
     few = batched_newton(platform, guess, legs, f_max=5)
-    assert (few.outcome == NewtonStatus.SINGULAR).all()
+    assert (few.status == NewtonStatus.SINGULAR).all()
     assert_at(platform, few, guess, 1e-13)
     assert batched_newton(platform, guess, legs, f_max=5, scaled=True).sweeps <= few.sweeps
 
@@ -242,7 +241,7 @@ def test_any_number_of_rows(count: int) -> None:
     platform = reference()
     truth, legs, guess = problem(platform, count=7)
     end = batched_newton(platform, guess[:count], legs[:count], device=torch.device("cpu"))
-    assert len(end.pose) == len(end.outcome) == len(end.iterations) == count
+    assert len(end.pose) == len(end.status) == len(end.iterations) == count
     assert end.converged.all()
     assert_at(platform, end, truth[:count], 1e-10)
     assert end.sweeps == (0 if count == 0 else end.iterations.max())
@@ -290,7 +289,7 @@ def test_what_is_wrong_with_the_arguments_is_said() -> None:
             batched_newton(platform, guess, legs, **bad)
 
 
-def test_every_outcome_has_its_sentence() -> None:
+def test_every_status_has_its_sentence() -> None:
     texts = [o.text for o in NewtonStatus]
     assert len(set(texts)) == len(NewtonStatus)
     assert all(t.endswith(".") for t in texts)

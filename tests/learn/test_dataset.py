@@ -9,8 +9,7 @@ from learn.networks import reference
 
 from gough import GoughError, Pose, assembly_sign, leg_lengths
 from gough.learn import data as module
-from gough.learn.data import DatasetSpec, chunks, dataset, write_dataset
-from gough.learn.graph import HexapodGraph
+from gough.learn.data import DatasetSpec, HexapodGraph, chunks, dataset, write_dataset
 
 
 def read(path) -> tuple[list[str], np.ndarray]:

@@ -6,7 +6,7 @@ from learn.networks import reference
 from machines import random_platform, with_some_workspace
 
 from gough import Platform, leg_lengths
-from gough.learn.graph import HexapodGraph, edge_lengths
+from gough.learn.data import HexapodGraph, edge_lengths
 
 
 @pytest.mark.parametrize("name", Platform.catalog())

@@ -20,7 +20,7 @@ from torch.autograd import gradcheck, gradgradcheck
 import gough
 import gough.learn
 from gough import GoughError, Platform, PlatformError, Pose, Status
-from gough.learn.implicit import implicit_pose
+from gough.learn.gradients import implicit_pose
 from gough.learn.kinematics import TorchPlatform
 from gough.learn.newton import refine
 from gough.status import NewtonStatus
@@ -91,7 +91,7 @@ def test_every_number_of_a_rotary_machine_has_a_gradient() -> None:
     start = torch.tensor(guess.position), torch.tensor(guess.rotation)
 
     def pose(arm: Tensor, rod: Tensor) -> tuple[Tensor, Tensor]:
-        changed = facts.with_facts(dict(facts.named_buffers()) | {"arm": arm, "rod": rod})
+        changed = facts.with_tensors(dict(facts.named_buffers()) | {"arm": arm, "rod": rod})
         end = refine(changed, *start, legs.detach(), gamma=1e-10)
         return end.position, end.rotation
 
@@ -136,7 +136,7 @@ def refine_planted(legs: Tensor, base: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     platform, guess, _, _ = planted()
     start = torch.tensor(guess.position), torch.tensor(guess.rotation)
     end = refine(TorchPlatform(platform).with_joints(base), *start, legs)
-    return end.position, end.rotation, end.outcome == NewtonStatus.CONVERGED
+    return end.position, end.rotation, end.status == NewtonStatus.CONVERGED
 
 
 @pytest.mark.parametrize("method", [solve_planted, refine_planted])
@@ -176,7 +176,7 @@ def test_a_pose_that_is_singular_to_the_last_digit_has_no_gradient() -> None:
     flat[1] = torch.tensor([0.1, 0.05, 1.1])
     rotation = torch.eye(3, dtype=torch.float64).expand(2, 3, 3)
     facts = TorchPlatform(platform)
-    legs = facts.legs_at(flat, rotation).requires_grad_()
+    legs = facts.leg_lengths(flat, rotation).requires_grad_()
     solved = torch.ones(2, dtype=torch.bool)
     position, _ = implicit_pose(facts, flat, rotation, legs, solved)
     (found,) = torch.autograd.grad(position.sum(), legs)

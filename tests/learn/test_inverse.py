@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support import seeds
 
 from gough import Platform
-from gough.learn.inverse import approximate_inverse, first_inverse, next_inverse
+from gough.learn.newton import approximate_inverse, first_inverse, next_inverse
 
 EYE = torch.eye(6, dtype=torch.float64)
 conditions = st.floats(0.0, 6.0).map(lambda x: 10**x)

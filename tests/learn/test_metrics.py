@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 from learn.networks import reference
 
 from gough import GoughError, Pose, leg_lengths, quaternion
-from gough.learn.metrics import measure
-from gough.learn.outcomes import outcome, refine
+from gough.learn.metrics import count_newton_ends, measure, plain_newton
 
 
 def off_by(pose: Pose, shift: float, degrees: float) -> Pose:
@@ -69,8 +68,8 @@ def test_newton_ends_at_the_true_pose_from_nearby(name):
     good = np.isfinite(legs).all(-1)
     truth, legs = truth[good], legs[good]
     guess = off_by(truth, 1e-3 * platform.size, 0.2)
-    assert outcome(platform, guess, truth, legs).share == 1
-    pose, converged = refine(platform, guess, legs)
+    assert count_newton_ends(platform, guess, truth, legs).share == 1
+    pose, converged = plain_newton(platform, guess, legs)
     assert converged.all()
     np.testing.assert_allclose(leg_lengths(platform, pose), legs, atol=1e-8 * platform.size)
 
@@ -80,10 +79,10 @@ def test_newton_counts_other_modes_and_rows_without_an_end():
     truth = platform.sample_poses(50, seed=1)
     legs = leg_lengths(platform, truth)
     mirrored = Pose(platform.home.position * [1, 1, -1])  # below the base
-    below = outcome(platform, Pose(np.tile(mirrored.position, (50, 1))), truth, legs)
+    below = count_newton_ends(platform, Pose(np.tile(mirrored.position, (50, 1))), truth, legs)
     assert below.true == 0
     assert below.other + below.unconverged == 50
     assert below.other > 0
     assert below.twins == 0  # none of them is in the workspace
-    impossible = outcome(platform, truth, truth, legs * [1, 1, 1, 1, 1, 9])
+    impossible = count_newton_ends(platform, truth, truth, legs * [1, 1, 1, 1, 1, 9])
     assert impossible.unconverged == 50

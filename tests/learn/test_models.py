@@ -7,7 +7,6 @@ from machines import random_platform, with_some_workspace
 from gough import GoughError, Platform, leg_lengths
 from gough.learn.loss import default_beta, pose_loss, training_loss
 from gough.learn.models import MODELS, Scaling, build
-from gough.learn.models.polynomial import PolynomialGuess
 from gough.learn.sampling import Stream
 
 COUNTS = {
@@ -36,15 +35,15 @@ def test_networks_give_poses_and_start_near_home(kind):
     torch.manual_seed(0)
     model = build(kind, platform, Scaling.of(platform)).eval()
     legs = torch.tensor(leg_lengths(platform, platform.sample_poses(50, 3)))
-    shift, turn = model(legs)
-    assert shift.shape == (50, 3)
-    assert shift.dtype == turn.dtype == torch.float64
+    translation, R = model(legs)
+    assert translation.shape == (50, 3)
+    assert translation.dtype == R.dtype == torch.float64
     eye = torch.eye(3, dtype=torch.float64)
-    torch.testing.assert_close(turn @ turn.mT, eye.expand_as(turn), atol=1e-5, rtol=0)
-    torch.testing.assert_close(torch.linalg.det(turn), torch.ones(50).double(), atol=1e-5, rtol=0)
-    angle = ((turn.diagonal(dim1=1, dim2=2).sum(-1) - 1) / 2).clamp(-1, 1).acos()
+    torch.testing.assert_close(R @ R.mT, eye.expand_as(R), atol=1e-5, rtol=0)
+    torch.testing.assert_close(torch.linalg.det(R), torch.ones(50).double(), atol=1e-5, rtol=0)
+    angle = ((R.diagonal(dim1=1, dim2=2).sum(-1) - 1) / 2).clamp(-1, 1).acos()
     assert angle.max() < 1
-    assert shift.abs().max() < 60
+    assert translation.abs().max() < 60
 
 
 @pytest.mark.parametrize("kind", ["resmlp", "disgnet", "gcn"])
@@ -82,25 +81,9 @@ def test_the_unit_of_length_changes_nothing(scale):
 
 def test_the_loss_is_the_papers():
     batch = Stream(reference()).batch(3, 0)
-    turn = torch.eye(3, dtype=torch.float64).expand(3, 3, 3)
-    shift = torch.zeros(3, 3, dtype=torch.float64)
-    turned = np.linalg.norm(np.eye(3) - batch.turn.numpy(), "fro", axis=(1, 2))
-    expected = np.mean(np.linalg.norm(batch.shift.numpy(), axis=1) + 250 * turned)
-    assert float(pose_loss(shift, turn, batch, 250.0)) == pytest.approx(expected)
-    assert float(pose_loss(batch.shift, batch.turn, batch, 250.0)) == 0
-
-
-def test_polynomials_get_better_with_their_degree():
-    platform = reference()
-    pose = platform.sample_poses(2000, 5)
-    legs = leg_lengths(platform, pose)
-    errors = []
-    for degree in (0, 1, 3, 4):
-        guess = PolynomialGuess(platform, degree)
-        assert guess.parameters == 12 * [1, 7, 28, 84, 210][degree]
-        errors.append(guess.guess(legs).distance(pose)[0].mean())
-    assert errors == sorted(errors, reverse=True)
-    assert errors[2] == pytest.approx(1.5, rel=0.1)  # measured when the project was planned
-    assert errors[3] == pytest.approx(0.75, rel=0.1)
-    with pytest.raises(GoughError, match="0 to 8"):
-        PolynomialGuess(platform, 9)
+    rotation = torch.eye(3, dtype=torch.float64).expand(3, 3, 3)
+    translation = torch.zeros(3, 3, dtype=torch.float64)
+    turned = np.linalg.norm(np.eye(3) - batch.rotation.numpy(), "fro", axis=(1, 2))
+    expected = np.mean(np.linalg.norm(batch.translation.numpy(), axis=1) + 250 * turned)
+    assert float(pose_loss(translation, rotation, batch, 250.0)) == pytest.approx(expected)
+    assert float(pose_loss(batch.translation, batch.rotation, batch, 250.0)) == 0

@@ -17,10 +17,10 @@ from learn.networks import reference, tiny, with_model
 from machines import random_platform
 
 from gough import GoughError, leg_lengths
-from gough.learn.checkpoint import load_tensors, save_tensors
 from gough.learn.config import PRESETS, DataConfig, RunConfig, TrainConfig, seconds
-from gough.learn.schedule import Clock, learning_rate
-from gough.learn.train import CHECKPOINT, Trainer, prepare, run, train
+from gough.learn.optim import Clock, learning_rate
+from gough.learn.run_folder import CHECKPOINT, load_tensors, save_tensors
+from gough.learn.train import Trainer, prepare, run, train
 from gough.seeds.network import NetworkSeed
 
 

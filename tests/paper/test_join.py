@@ -18,7 +18,7 @@ def small():
 def test_the_truth_scores_perfectly(small):
     found = score(lambda legs: small.truth, small, "truth")
     assert found.metrics.trans_mean == 0
-    assert found.outcome.share == 1
+    assert found.newton.share == 1
     assert found.answered == 300
     assert str(found).startswith("truth, 300 poses, 300 answered")
 

@@ -11,11 +11,10 @@ import pytest
 import torch
 from cli.conftest import Result, command, environment
 
-from gough.learn.checkpoint import load_tensors
 from gough.learn.models import MODELS
-from gough.paper import tables
-from gough.paper.plan import QUICK, SETS, Plan
-from gough.paper.study import Study
+from gough.learn.run_folder import load_tensors
+from gough.paper import results
+from gough.paper.study import QUICK, SETS, Plan, Study
 from gough.platform import Platform
 
 pytestmark = pytest.mark.slow
@@ -70,15 +69,28 @@ def test_all_networks_had_their_steps(study):
 
 def test_a_table_made_again_says_the_same(study, tmp_path):
     copy = tmp_path / "copy"
-    for part in ("networks", "results"):
-        shutil.copytree(study / part, copy / part)  # no runs: the networks are enough
-    shutil.copy(study / "plan.json", copy)
+    shutil.copytree(study / "results", copy / "results")  # no runs: the networks are enough
+    for name in ("plan.json", "networks.json"):
+        shutil.copy(study / name, copy)
     stages = ("networks", "sets", "methods", "iterations", "curves", "poses", "errors")
-    done = paper("-o", copy, *[word for s in stages for word in ("--stage", s)])
+    words = [word for s in stages for word in ("--stage", s)]
+    done = paper("-o", copy, "--networks", study / "networks", *words)
     assert done.code == 0, done.err
     for stage in stages:
         first, again = (without_times(f / "results" / f"{stage}.json") for f in (study, copy))
         assert first == again, stage
+
+
+def test_other_networks_than_those_of_the_results_are_refused(study, tmp_path):
+    copy = tmp_path / "networks"
+    shutil.copytree(study / "networks", copy)
+    shutil.copy(copy / "90" / "gcn.onnx", copy / "80" / "gcn.onnx")
+    done = paper("-o", study, "--stage", "sets", "--networks", copy)
+    assert done.code == 2
+    assert "80/gcn.onnx: is not the network of this study" in done.err
+    sums = json.loads((study / "networks.json").read_text())
+    assert len(sums) == len(SETS) * len(MODELS)
+    assert sums["90/gcn.onnx"]["sha256"][:16] in (study / "index.md").read_text()
 
 
 def without_times(path: Path):
@@ -95,7 +107,7 @@ def without_times(path: Path):
 
 def test_a_training_made_again_gives_the_same_bits(study, tmp_path):
     plan = Plan.load(study / "plan.json")
-    again = Study(Platform.load("reference"), plan, tmp_path)
+    again = Study(Platform.load("reference"), plan, tmp_path, tmp_path / "networks")
     from gough.learn.train import train
 
     threads = torch.get_num_threads()
@@ -143,18 +155,18 @@ def test_a_stage_without_networks_says_what_to_run(study, tmp_path):
     shutil.copy(study / "plan.json", tmp_path)
     done = paper("-o", tmp_path, "--stage", "sets")
     assert done.code == 2
-    assert "not trained yet; run: gough paper --stage train" in done.err
+    assert "there is no such network; run: gough paper --stage train" in done.err
 
 
 def test_another_machine_has_a_study_too(tmp_path):
     """Metres, motor arms: the experiments are not made for one platform."""
     machine = Platform.load("reachy_mini")
     plan = replace(QUICK, budget=0.2, platform=machine.digest, steps=dict.fromkeys(MODELS, 5))
-    other = Study(machine, plan, tmp_path)
+    other = Study(machine, plan, tmp_path, tmp_path / "networks")
     threads = torch.get_num_threads()
     try:
         other.train(["full"], show=False)
-        rows = tables.methods(other)["rows"]
+        rows = results.methods(other)["rows"]
     finally:
         torch.set_num_threads(threads)
     ends = {r["name"]: (r["singular"], r["imprecise"], r["wrong"]) for r in rows}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gough.paper import published
-from gough.paper.layout import number, page, percent, table
-from gough.paper.series import linear_fit
+from gough.paper.markdown import number, page, percent, table
+from gough.paper.results import linear_fit
 
 
 def test_a_table_with_an_empty_cell_is_refused():

@@ -18,8 +18,8 @@ COMMANDS = {
         "gough.commands.platforms", "run", "The machines that come with gough, to copy and edit.",
     ),
     "export": ("gough.commands.export", "FORMATS", "A machine for other programs, such as C."),
-    "dataset": ("gough.commands.learn", "dataset", "Poses and leg readings to train networks on."),
-    "train": ("gough.commands.learn", "train", "Train a network that guesses a machine's poses."),
-    "evaluate": ("gough.commands.learn", "evaluate", "Compare the errors of first guesses."),
+    "dataset": ("gough.commands.dataset", "run", "Poses and leg readings to train networks on."),
+    "train": ("gough.commands.train", "run", "Train a network that guesses a machine's poses."),
+    "evaluate": ("gough.commands.evaluate", "run", "Compare the errors of first guesses."),
     "paper": ("gough.commands.paper", "run", "Repeat the experiments of the DisGNet paper."),
 }  # fmt: skip

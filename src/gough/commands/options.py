@@ -57,6 +57,16 @@ IgnorePlatform = Annotated[
 AllowFailures = Annotated[bool, option("Exit with 0 even if some rows have no usable result.")]
 Head = Annotated[int, arg(metavar="N", help="Print this many rows where no file is written.")]
 BlockRows = Annotated[int, arg(metavar="N", help="Hold this many rows in memory at a time.")]
+WorkspaceBox = Annotated[
+    tuple[float, float] | None,
+    option(
+        "Use another workspace about home: +-LENGTH [platform unit] and +-DEG on each axis.",
+        "LENGTH DEG",
+    ),
+]
+SameAssembly = Annotated[
+    bool, option("Use only poses that are reached without crossing a singularity.")
+]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import UseAppendAction, arg
 
+from gough.commands.options import PlatformName, option
+
 if TYPE_CHECKING:
-    from gough.paper.plan import Plan
-    from gough.paper.study import Study
+    from gough.paper.study import Plan, Study
     from gough.platform import Platform
 
 Stage = Literal[
@@ -22,22 +23,20 @@ Stage = Literal[
 
 def run(
     *,
-    platform: Annotated[
-        str,
-        arg(aliases=["-p"], metavar="PLATFORM", help="a machine of the catalog, or a .toml file."),
-    ] = "reference",
-    out: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER", help="of the study.")] = Path(
-        "gough-paper"
-    ),
+    platform: PlatformName = "reference",
+    out: Annotated[
+        Path, arg(aliases=["-o"], metavar="FOLDER", help="Write the study to this folder.")
+    ] = Path("gough-paper"),
+    networks: Annotated[Path | None, option(metavar="FOLDER")] = None,
     quick: bool = False,
-    budget: Annotated[str | None, arg(metavar="TIME", help_behavior_hint="")] = None,
+    budget: Annotated[str | None, option(metavar="TIME")] = None,
     stage: Annotated[
         UseAppendAction[tuple[Stage, ...]],
-        arg(metavar="STAGE...", help_behavior_hint=""),
+        option(metavar="STAGE..."),
     ] = (),
     resume: bool = False,
 ) -> int:
-    """The DisGNet paper's experiments, run again: networks, tables, figures, report.
+    """Run the DisGNet paper's experiments again: networks, tables, figures, report.
 
     gough paper --quick
 
@@ -50,16 +49,17 @@ def run(
     The folder gets index.md, report.html, figures, results and networks.
 
     Args:
-        quick: everything at small scale, in about two minutes.
-        budget: processor time for each network, such as 5m; else 5m, or 1s if quick.
-        stage: only this part, may be repeated: train, then networks, sets, methods, iterations,
+        networks: Take the networks from this folder instead of the study's own; each must have the
+            sum that networks.json states.
+        quick: Run everything at small scale, in about two minutes.
+        budget: Train each network for this processor time, such as 5m; else 5m, or 1s if --quick.
+        stage: Run only this part; may be repeated: train, then networks, sets, methods, iterations,
             wide, curves, times, poses, errors, then report.
-        resume: go on with a study that was stopped: what is there stays.
+        resume: Go on with a study that was stopped; results that exist are kept.
     """
     from gough.errors import GoughError
     from gough.learn.config import seconds
-    from gough.paper.plan import FULL, QUICK
-    from gough.paper.study import PLAN
+    from gough.paper.study import FULL, PLAN, QUICK
     from gough.platform import Platform
 
     machine = Platform.load(platform)
@@ -72,7 +72,8 @@ def run(
             f"{out}: holds a study already; go on with --resume, repeat a part with --stage, or "
             "name another folder with -o"
         )
-    study = _open(machine, out, sizes, asked=quick or budget is not None)
+    study = _open(machine, out, networks or out / "networks", sizes,
+                  given=quick or budget is not None)  # fmt: skip
     command = _command(platform, out)
     for name in stage or STAGES:
         if resume and name not in ("train", "report") and study.result_path(name).exists():
@@ -85,15 +86,14 @@ def run(
 STAGES: tuple[Stage, ...] = Stage.__args__  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def _open(machine: Platform, out: Path, sizes: Plan, *, asked: bool) -> Study:
-    """The study in a folder: the one that is there, or a new one with every network timed.
+def _open(machine: Platform, out: Path, networks: Path, sizes: Plan, *, given: bool) -> Study:
+    """Open the study of a folder, or make a new one with every network timed.
 
     Raises:
-        GoughError: the one that is there has other sizes or another platform.
+        GoughError: the folder's study has other sizes, another platform or other networks.
     """
     from gough.errors import GoughError
-    from gough.paper.plan import Plan
-    from gough.paper.study import PLAN, Study
+    from gough.paper.study import PLAN, Plan, Study
 
     path = out / PLAN
     if not path.exists():
@@ -103,13 +103,15 @@ def _open(machine: Platform, out: Path, sizes: Plan, *, asked: bool) -> Study:
     plan = Plan.load(path)
     if plan.platform != machine.digest:
         raise GoughError(f"{out}: is a study of another platform than {machine.name!r}")
-    if asked and replace(plan, steps={}, platform="") != sizes:
+    if given and replace(plan, steps={}, platform="") != sizes:
         raise GoughError(f"{out}: is a study of another size; name another folder with -o")
-    return Study(machine, plan, out)
+    study = Study(machine, plan, out, networks)
+    study.check_networks()
+    return study
 
 
 def _carry_out(study: Study, name: Stage, command: str) -> None:
-    """One stage, and what is said about it."""
+    """Run one stage and print its name."""
     print(f"{name} ...", flush=True)
     if name == "train":
         study.train()
@@ -120,13 +122,12 @@ def _carry_out(study: Study, name: Stage, command: str) -> None:
         report.write(study)
         print(f"{study.folder / 'index.md'} and {study.folder / 'report.html'}: written")
     else:
-        from gough.paper import series, tables
+        from gough.paper.results import STAGES as MAKERS
 
-        make = getattr(tables, name, None) or getattr(series, name)
-        study.save(name, make(study), f"{command} --stage {name}")
+        study.save(name, MAKERS[name](study), f"{command} --stage {name}")
 
 
 def _command(platform: str, out: Path) -> str:
-    """What to type to repeat a stage."""
+    """Command line that repeats a stage."""
     words = ["gough", "paper", "-o", str(out)]
     return shlex.join(words if platform == "reference" else [*words, "-p", platform])

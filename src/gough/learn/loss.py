@@ -1,10 +1,11 @@
-"""What training makes small."""
+"""Training losses: the paper's, and that of its baseline plain-MLP."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
+from gough.learn.kinematics import matrix_to_euler
 from gough.learn.models.base import PoseNetwork
 from gough.learn.sampling import Batch
 from gough.platform import Platform
@@ -12,28 +13,29 @@ from gough.platform import Platform
 BETA_OF_SIZE = 0.3
 
 
-def pose_loss(shift: Tensor, turn: Tensor, wanted: Batch, beta: float) -> Tensor:
-    """Mean of |t - t*| + beta |R - R*|_F over the batch, a number [platform unit].
+def pose_loss(translation: Tensor, rotation: Tensor, wanted: Batch, beta: float) -> Tensor:
+    """Mean of |t - t*| + beta |R - R*|_F over a batch, a number [platform unit].
 
     Args:
-        shift: (N, 3) [platform unit].
-        turn: (N, 3, 3).
+        translation: (N, 3) [platform unit].
+        rotation: (N, 3, 3).
+        wanted: true poses.
         beta: weight of the rotation [platform unit]; the paper's is 250 mm.
     """
-    away = torch.linalg.vector_norm(shift - wanted.shift, dim=-1)
-    turned = torch.linalg.vector_norm((turn - wanted.turn).flatten(1), dim=-1)
-    return (away + beta * turned).mean()
+    length = torch.linalg.vector_norm(translation - wanted.translation, dim=-1)
+    angle = torch.linalg.vector_norm((rotation - wanted.rotation).flatten(1), dim=-1)
+    return (length + beta * angle).mean()
 
 
 def euler_loss(model: PoseNetwork, raw: Tensor, wanted: Batch) -> Tensor:
-    """Mean squared error of six scaled numbers: what plain-MLP is trained with."""
-    shift = (wanted.shift - model.shift_mean) / model.shift_scale
-    angles = matrix_to_euler(wanted.turn) / model.turn_scale
-    return (raw - torch.cat([shift, angles], dim=-1)).square().mean()
+    """Mean squared error of the six scaled numbers that plain-MLP gives (N, 6)."""
+    translation = (wanted.translation - model.shift_mean) / model.shift_scale
+    angles = matrix_to_euler(wanted.rotation) / model.turn_scale
+    return (raw - torch.cat([translation, angles], dim=-1)).square().mean()
 
 
 def training_loss(model: PoseNetwork, legs: Tensor, wanted: Batch, beta: float) -> Tensor:
-    """The loss that belongs to the model's kind of output."""
+    """The loss of a network's kind, for readings (N, 6): `euler_loss` or `pose_loss`."""
     raw = model.raw(legs)
     if model.rotation == "euler":
         return euler_loss(model, raw, wanted)
@@ -41,17 +43,9 @@ def training_loss(model: PoseNetwork, legs: Tensor, wanted: Batch, beta: float) 
 
 
 def default_beta(platform: Platform) -> float:
-    """Weight of the rotation where none is given: 0.3 of the platform's size [unit].
+    """Weight of the rotation unless one is given: 0.3 of the platform's size [platform unit].
 
-    About the distance of the joints from the pivot's axis, so that both terms of the loss
-    measure how far joints are off; 240 mm for the reference platform, where the paper has 250.
+    This is about the distance of the joints from the pivot's axis, so that both terms of the loss
+    measure displacements of joints; 240 mm for the reference platform, where the paper has 250.
     """
     return BETA_OF_SIZE * platform.size
-
-
-def matrix_to_euler(turn: Tensor) -> Tensor:
-    """Euler angles (..., 3) [rad], R = Rx(a) Ry(b) Rz(c), of matrices (..., 3, 3)."""
-    a = torch.atan2(-turn[..., 1, 2], turn[..., 2, 2])
-    b = torch.asin(turn[..., 0, 2].clamp(-1, 1))
-    c = torch.atan2(-turn[..., 0, 1], turn[..., 0, 0])
-    return torch.stack([a, b, c], dim=-1)

@@ -1,24 +1,43 @@
-"""SOAP: Adam in the eigenbasis of Shampoo's preconditioner, for small networks.
+"""The optimiser SOAP, and the schedule: how far a run is and which learning rate it has there.
 
-Source: Vyas et al., SOAP: Improving and Stabilizing Shampoo using Adam (2024), algorithm 3.
-The bases are refreshed by one step of orthogonal iteration, which is cheap for matrices
-of this size; vectors (biases, gains) get plain Adam.
+SOAP is Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al., SOAP: Improving and
+Stabilizing Shampoo using Adam (2024), algorithm 3). The bases are refreshed by one step of
+orthogonal iteration, which is cheap for matrices of this size; vectors (biases, gains) get plain
+Adam.
 """
 
 from __future__ import annotations
 
+import time
+from typing import Protocol
+
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.optim import Optimizer
+
+from gough.learn.config import OptimiserConfig, RunConfig, seconds
+
+RESERVE = 0.03  # share of a budget kept for the last checkpoint and the export,
+MOST_RESERVED = 10.0  # but at most this [s]
+LONGEST_WARMUP = 0.05  # share of a run after which the rate has risen, however few its steps
+SIDES = ("left", "right")
+
+
+def make_optimiser(config: OptimiserConfig, model: nn.Module) -> Optimizer:
+    """Create the optimiser that a configuration names."""
+    kind = {"soap": SOAP, "adam": torch.optim.Adam, "adamw": torch.optim.AdamW}[config.kind]
+    return kind(model.parameters(), lr=config.lr, weight_decay=config.weight_decay)
 
 
 class SOAP(Optimizer):
     """SOAP for parameters with at most two axes.
 
     Args:
+        params: parameters to optimise.
         lr: step size.
         betas: decay of the gradient's mean and of its square in the eigenbasis.
         shampoo_beta: decay of the two factors G G^T and G^T G.
+        eps: added to the root of the squares.
         weight_decay: decoupled, times lr.
         refresh: steps between refreshes of the eigenbases.
         largest: axes longer than this keep the identity as their basis.
@@ -48,14 +67,16 @@ def _update(p: Tensor, grad: Tensor, state: dict, group: dict) -> None:
         _start(grad, state, group)
     state["step"] += 1
     beta1, beta2 = group["betas"]
-    rotated = _rotate(grad, state)
+    rotated = _into_basis(grad, state)
     state["mean"].lerp_(grad, 1 - beta1)
     state["square"].lerp_(rotated.square(), 1 - beta2)
     unbias = (1 - beta2 ** state["step"]) ** 0.5 / (1 - beta1 ** state["step"])
-    move = _rotate(state["mean"], state) / (state["square"].sqrt() + group["eps"])
+    move = _into_basis(state["mean"], state) / (state["square"].sqrt() + group["eps"])
     p.mul_(1 - group["lr"] * group["weight_decay"])
-    p.add_(_rotate_back(move, state), alpha=-group["lr"] * unbias)
-    _learn_basis(grad, state, group)
+    p.add_(_out_of_basis(move, state), alpha=-group["lr"] * unbias)
+    _accumulate(grad, state, group["shampoo_beta"])
+    if state["step"] % group["refresh"] == 0:
+        _refresh(state)
 
 
 def _start(grad: Tensor, state: dict, group: dict) -> None:
@@ -63,27 +84,26 @@ def _start(grad: Tensor, state: dict, group: dict) -> None:
     state["mean"], state["square"] = torch.zeros_like(grad), torch.zeros_like(grad)
     if grad.ndim != 2:
         return
-    for side, size in (("left", grad.shape[0]), ("right", grad.shape[1])):
+    for side, size in zip(SIDES, grad.shape, strict=True):
         if 1 < size <= group["largest"]:
             state[side] = torch.zeros(size, size, dtype=grad.dtype, device=grad.device)
     _accumulate(grad, state, 0.0)
-    for side in ("left", "right"):
+    for side in SIDES:
         if side in state:
             state[f"{side}_basis"] = torch.linalg.eigh(state[side])[1].flip(1).contiguous()
 
 
 def _accumulate(grad: Tensor, state: dict, beta: float) -> None:
+    """Update the factors G G^T and G^T G."""
     if "left" in state:
         state["left"].lerp_(grad @ grad.T, 1 - beta)
     if "right" in state:
         state["right"].lerp_(grad.T @ grad, 1 - beta)
 
 
-def _learn_basis(grad: Tensor, state: dict, group: dict) -> None:
-    _accumulate(grad, state, group["shampoo_beta"])
-    if state["step"] % group["refresh"]:
-        return
-    for side, axis in (("left", 0), ("right", 1)):
+def _refresh(state: dict) -> None:
+    """Improve the bases by one step of orthogonal iteration, largest eigenvalues first."""
+    for axis, side in enumerate(SIDES):
         if side not in state:
             continue
         factor, basis = state[side], state[f"{side}_basis"]
@@ -93,14 +113,81 @@ def _learn_basis(grad: Tensor, state: dict, group: dict) -> None:
         state[f"{side}_basis"] = torch.linalg.qr(factor @ basis[:, order])[0].contiguous()
 
 
-def _rotate(g: Tensor, state: dict) -> Tensor:
-    """Into the eigenbasis."""
+def _into_basis(g: Tensor, state: dict) -> Tensor:
     if "left_basis" in state:
         g = state["left_basis"].T @ g
     return g @ state["right_basis"] if "right_basis" in state else g
 
 
-def _rotate_back(g: Tensor, state: dict) -> Tensor:
+def _out_of_basis(g: Tensor, state: dict) -> Tensor:
     if "left_basis" in state:
         g = state["left_basis"] @ g
     return g @ state["right_basis"].T if "right_basis" in state else g
+
+
+# ---- schedule -----------------------------------------------------------------------------
+
+
+def learning_rate(config: OptimiserConfig, step: int, progress: float) -> float:
+    """Learning rate of step number `step`, counted from 0, at `progress` (0 to 1) of the run."""
+    rate = config.lr
+    if config.warmup:
+        rate *= min(1.0, max((step + 1) / config.warmup, progress / LONGEST_WARMUP))
+    if config.schedule == "falling" and progress > config.hold:
+        rate *= max(0.0, (1 - progress) / (1 - config.hold)) ** config.power
+    return rate
+
+
+class RunLength(Protocol):
+    """Settings that state the length of a run."""
+
+    @property
+    def run(self) -> RunConfig:
+        """Budget and clock."""
+        ...
+
+    def total_steps(self) -> int | None:
+        """Steps of the run, None under a budget."""
+        ...
+
+
+class Clock:
+    """Progress by steps, or by time under a budget.
+
+    Time is counted step by step, and no step counts for more than 20 typical ones (at least a
+    second): a machine that slept, or a process that was stopped, loses no training time.
+
+    Attributes:
+        elapsed: time trained so far, over all resumptions, by the configuration's clock [s].
+    """
+
+    def __init__(self, config: RunLength) -> None:
+        self.total = config.total_steps()
+        self.budget = None
+        if self.total is None:
+            whole = seconds(config.run.budget or "10m")
+            self.budget = whole - min(RESERVE * whole, MOST_RESERVED)
+        self.elapsed = 0.0
+        self._now = time.process_time if config.run.clock == "processor" else time.monotonic
+        self._typical = 0.0
+        self._last = self._now()
+
+    def progress(self, step: int) -> float:
+        """Share of the run that is done after `step` steps, 1 at its end."""
+        if self.total is not None:
+            return min(1.0, step / self.total)
+        assert self.budget is not None
+        return min(1.0, self.elapsed / self.budget)
+
+    def remaining(self, step: int) -> float:
+        """Estimated time left [s]."""
+        done = self.progress(step)
+        return self.elapsed * (1 - done) / done if done > 0 else float("nan")
+
+    def tick(self) -> None:
+        """Count the time since the last call."""
+        now = self._now()
+        passed = now - self._last
+        self._last = now
+        self.elapsed += min(passed, max(1.0, 20 * self._typical)) if self._typical else passed
+        self._typical += 0.05 * (min(passed, 20 * self._typical or passed) - self._typical)

@@ -1,6 +1,6 @@
 """The benchmark for methods of others: one test set, by seed and checksum, and one score.
 
-    from gough.paper.join import benchmark, score
+    from gough.paper.benchmark import benchmark, score
 
     print(score(my_method, benchmark()))
 
@@ -20,15 +20,14 @@ import numpy as np
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.learn.evaluate import held_out
-from gough.learn.metrics import Metrics, measure
-from gough.learn.outcomes import Outcome, outcome
-from gough.paper.layout import number, percent
-from gough.paper.plan import machine_of
+from gough.learn.metrics import Metrics, NewtonCounts, count_newton_ends, measure
+from gough.paper.markdown import number, percent
+from gough.paper.study import with_workspace_of
 from gough.platform import Platform
 from gough.pose import Pose
 
 POSES = 100_000
-GRAIN = 1e-6  # of the platform's size, or [rad]: what the checksum can tell apart
+GRAIN = 1e-6  # resolution of the checksum [platform size] and [rad]
 CHECKSUMS = {
     "paper": "107c138fada4a09d960b08bf20118075a1155e5911fe44b4d26d3894fbe2f17b",
     "wide": "01f100e037e87341e49964aa2bb2a5559bc08e882f5e74d73aa25f4e5c7088c7",
@@ -55,8 +54,8 @@ class Benchmark:
     def checksum(self) -> str:
         """SHA-256 of positions, rotations and readings, as whole multiples of a millionth.
 
-        Of the platform's size for lengths, of one for quaternions; so that it is the same on all
-        machines, whose sines may differ in the last bit.
+        Of the platform's size for lengths, of one for quaternions. Thus it is the same on all
+        machines, although their sines may differ in the last bit.
         """
         grain = GRAIN * self.platform.size
         parts = (self.truth.position / grain, self.truth.wxyz / GRAIN, self.legs / grain)
@@ -66,20 +65,21 @@ class Benchmark:
 
 @dataclass(frozen=True)
 class Score:
-    """What a method reached.
+    """Results of a method.
 
     Attributes:
+        name: of the method.
         answered: rows with a finite pose; errors are taken over all rows, with the home pose for
             a row without an answer.
         metrics: errors of the poses as they are.
-        outcome: where Newton's method ends that starts from them.
-        seconds: of the one call for all rows.
+        newton: where Newton's method ends that starts from them.
+        seconds: time of the one call for all rows [s].
     """
 
     name: str
     answered: int
     metrics: Metrics
-    outcome: Outcome
+    newton: NewtonCounts
     seconds: float
 
     def __str__(self) -> str:
@@ -91,13 +91,13 @@ class Score:
             f"E-rot    {number(m.rot_mean)} deg, median {number(m.rot_median)}, "
             f"worst {number(m.rot_worst)}, below 1 deg {percent(m.rot_within[1], 2)} %",
             f"E-ik     {number(m.ik_mean)} mm",
-            f"Newton from there: true pose {percent(self.outcome.share, 3)} %, another "
-            f"{self.outcome.other}, no end {self.outcome.unconverged}",
+            f"Newton from there: true pose {percent(self.newton.share, 3)} %, another "
+            f"{self.newton.other}, no end {self.newton.unconverged}",
         ])  # fmt: skip
 
 
 def benchmark(name: str = "paper") -> Benchmark:
-    """The test set "paper" or "wide"; the same everywhere, by its checksum.
+    """Make the test set "paper" or "wide", the same everywhere, as its checksum proves.
 
     Raises:
         GoughError: no such set, or this machine makes other numbers than it should.
@@ -105,7 +105,7 @@ def benchmark(name: str = "paper") -> Benchmark:
     if name not in CHECKSUMS:
         raise GoughError(f"test set: expected one of {', '.join(CHECKSUMS)}, got {name!r}")
     wide = name == "wide"
-    platform = machine_of(Platform.load("reference"), "wide" if wide else "full")
+    platform = with_workspace_of(Platform.load("reference"), "wide" if wide else "full")
     out = Benchmark(name, platform, *held_out(platform, POSES, same_assembly=wide))
     if out.checksum != CHECKSUMS[name]:
         raise GoughError(
@@ -117,12 +117,13 @@ def benchmark(name: str = "paper") -> Benchmark:
 
 
 def score(method: Callable[[Array], Any], test: Benchmark, name: str | None = None) -> Score:
-    """Errors of a method over a test set, and where Newton's method ends from its poses.
+    """Measure a method's errors over a test set, and where Newton's method ends from its poses.
 
     Args:
         method: from readings (N, 6) [mm] to a Pose (N,), to matrices (N, 4, 4), or to a pair of
             positions (N, 3) and quaternions (N, 4), scalar first. NaN: no answer.
-        name: what the score is called; the function's name unless given.
+        test: the test set.
+        name: name of the score; the function's name unless given.
 
     Raises:
         GoughError: an answer of another shape.
@@ -137,7 +138,7 @@ def score(method: Callable[[Array], Any], test: Benchmark, name: str | None = No
     return Score(
         name or getattr(method, "__name__", "method"), int(answered.sum()),
         measure(test.platform, pose, test.truth, test.legs),
-        outcome(test.platform, pose, test.truth, test.legs), seconds,
+        count_newton_ends(test.platform, pose, test.truth, test.legs), seconds,
     )  # fmt: skip
 
 

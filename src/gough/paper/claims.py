@@ -1,17 +1,17 @@
-"""The paper's claims about its methods, each beside what came out here."""
+"""The paper's claims about its methods, each beside the result here."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from gough.paper import published
-from gough.paper.layout import number, percent
+from gough.paper.markdown import number, percent
 from gough.paper.study import Study
 
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, in its number and in ours."""
+    """A claim of the paper, with its number and ours."""
 
     claim: str
     paper: str
@@ -20,7 +20,7 @@ class Claim:
 
 
 def claims(study: Study) -> list[Claim]:
-    """All of them, from the stages' results."""
+    """All claims, from the results of the stages."""
     return [*_networks(study), *_sets(study), *_methods(study), *_iterations(study), *_times(study)]
 
 

@@ -1,4 +1,4 @@
-"""The figures, drawn from what the stages kept."""
+"""The figures, drawn from the results of the stages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SOLVED = PoseStyle(plate=VERMILION, line="--", width=1.2, fill=0.0, legs=INK, ba
 
 
 def draw_all(study: Study) -> list[str]:
-    """Write all figures into the study's folder; their names."""
+    """Write all figures into the study's folder and return their names."""
     folder = study.folder / "figures"
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in FIGURES.items():
@@ -130,7 +130,7 @@ def _times(study: Study, names: tuple[str, str]) -> Figure:
 
 
 def _band(fit: dict, x: np.ndarray) -> np.ndarray:
-    """Half the width of the 95 % confidence band of the mean, see `series.linear_fit`."""
+    """Half the width of the 95 % confidence band of the mean, see `results.linear_fit`."""
     spread = np.sqrt(1 / fit["count"] + (x - fit["mean"]) ** 2 / fit["sxx"])
     return fit["quantile"] * fit["deviation"] * spread
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from gough.paper import published
 from gough.paper.claims import claims
-from gough.paper.layout import NOTHING, milliseconds, number, page, percent, table
-from gough.paper.plan import BATCH, machine_of
-from gough.paper.study import Study
+from gough.paper.markdown import NOTHING, milliseconds, number, page, percent, table
+from gough.paper.results import STAGES
+from gough.paper.study import BATCH, SUMS, Study, with_workspace_of
 from gough.whole_file import write_whole
 
 TITLE = "The DisGNet paper's experiments, run again"
@@ -18,14 +18,12 @@ DISCUSSION, PAGE = "discussion.md", "report.html"
 def write(study: Study) -> None:
     """Write index.md and report.html into the study's folder; the figures must be there."""
     text = "\n\n".join(part(study) for part in PARTS) + "\n"
-    link = f"This page with its figures in one file: [{PAGE}]({PAGE}).\n"
-    write_whole(study.folder / "index.md", (text + "\n" + link).encode())
-    html = page(text, TITLE, study.folder)
-    write_whole(study.folder / PAGE, html.encode())
+    write_whole(study.folder / "index.md", text.encode())
+    write_whole(study.folder / PAGE, page(text, TITLE, study.folder).encode())
 
 
 def introduction(study: Study) -> str:
-    """What was done, and with what."""
+    """Introduction: data, training, and what the numbers are."""
     plan, unit = study.plan, _unit(study)
     return f"""# {TITLE}
 
@@ -34,9 +32,9 @@ printed in Zhu et al., *DisGNet: A Distance Graph Neural Network for Forward Kin
 Gough-Stewart Platform*: 1200 epochs of training, and times of one RTX 3090. It does not print the
 joints of its platform, so absolute errors need not agree; what can be compared is what it claims
 about methods. Everything else on this page was computed by `gough paper`, and can be computed
-again: `gough paper --stage NAME -o FOLDER` repeats one table from the networks in the folder, with
-the same accuracy figures to the last digit. Times differ. "{NOTHING}" stands where the paper has no
-number.
+again: `gough paper --stage NAME -o FOLDER --networks NETWORKS` repeats one table from the networks,
+with the same accuracy figures to the last digit. Times differ. "{NOTHING}" stands where the paper
+has no number.
 
 **Data.** The full training set is the first {plan.rows:,} rows of `gough dataset --seed
 {plan.seed}`, the others the first 90 and 80 % of these. Errors are means over {plan.test:,}
@@ -50,7 +48,7 @@ bit on a machine of the same kind."""
 
 
 def claims_part(study: Study) -> str:
-    """What the paper says, and whether it holds here."""
+    """The paper's claims, each with a yes or no."""
     rows = [(c.claim, c.paper, c.here, "yes" if c.holds else "**no**") for c in claims(study)]
     discussion = study.folder / DISCUSSION
     words = discussion.read_text().strip() if discussion.exists() else ""
@@ -87,8 +85,8 @@ def networks(study: Study) -> str:
         "the logarithm, is sqrt(2) times that, but its tables agree with each other only if they "
         "hold the angle. \"True pose\" is where Newton with exact inverses and no second try ends.",
         table(head, rows), _made(study, "networks"),
-        "What the budget came to. Seconds are the processor time that the trainings took, on a "
-        "machine that did other work besides:",
+        "Steps that the budget allowed. Seconds are the processor time that the trainings took, on "
+        "a machine that did other work too:",
         table(("network", "steps", "epochs of the full set", "seconds"), steps),
     ])  # fmt: skip
 
@@ -184,19 +182,19 @@ def wide(study: Study) -> str:
     every = [(*_guess_cells(row), row["solve_wrong"]) for row in result["all"]]
     return "\n\n".join([
         "## A wide workspace",
-        f"{_box(study, 'wide')}. In the paper's workspace every seed leads Newton to the true "
-        "pose; here seeds differ. First over the poses that are reached without crossing a "
-        "singularity (det J of home's sign), which the networks were trained on. Twins are poses "
-        "of this workspace whose readings belong to another such pose as well: no function of the "
-        "readings can be right for both.",
+        f"{_box(study, 'wide')}. In the paper's workspace Newton's method reaches the true pose "
+        "from every seed; here seeds differ. First over the poses that are reached without "
+        "crossing a singularity (det J of home's sign), which the networks were trained on. Twins "
+        "are poses of this workspace whose readings belong to another such pose as well: no "
+        "function of the readings can be right for both.",
         table(head, same),
-        "Then over all poses of the box, beyond singularities too, where readings alone cannot "
-        "tell which pose was meant:",
+        "Then over all poses of the box, beyond singularities too, where readings alone do "
+        "not determine the pose:",
         table(head, every),
         f"The batched method from the same guesses, over the first "
         f"{result['same'][0]['batched']['count']:,} poses of the first table, gamma = 0.0001. Its "
-        "limit here is the inverse, which 20 iterations do not always reach; with lengths told in "
-        "the platform's size (\"scaled\", not in the paper) they do.",
+        "limit here is the inverse, which 20 iterations do not always reach; with lengths in units "
+        "of the platform's size (\"scaled\", not in the paper) they do.",
         table(ends, second), _made(study, "wide"),
     ])  # fmt: skip
 
@@ -223,17 +221,23 @@ def figures(study: Study) -> str:
 
 
 def provenance(study: Study) -> str:
-    """Where each number was made."""
+    """Command, commit and machine of each number, and the sums of the networks."""
     rows = []
-    for stage in ("networks", "sets", "methods", "iterations", "wide", "curves", "times", "poses",
-                  "errors"):  # fmt: skip
+    for stage in STAGES:
         made = study.result(stage)["made"]
         commit = (made["commit"] or "unknown")[:12]
         machine = f"{made['processor']}, {made['cores']} cores"
         rows.append((f"`{made['command']}`", f"`{commit}`", study.plan.seed, machine,
                      made["torch"], made["numpy"]))  # fmt: skip
     head = ("command", "commit", "seed", "machine", "torch", "numpy")
-    return "## How each was made\n\n" + table(head, rows)
+    sums = [(f"`{path}`", f"{known['bytes']:,}", f"`{known['sha256'][:16]}`")
+            for path, known in study.known_sums().items()]  # fmt: skip
+    return "\n\n".join([
+        "## How each was made", table(head, rows),
+        "The networks, which `gough paper --stage train` makes again; `--networks FOLDER` takes "
+        f"them from where they are kept. The whole sums stand in `{SUMS}`.",
+        table(("network", "bytes", "SHA-256, first 16 digits"), sums),
+    ])  # fmt: skip
 
 
 def _guess_cells(row: dict) -> tuple:
@@ -280,8 +284,8 @@ def _unit(study: Study) -> str:
 
 
 def _box(study: Study, name: str) -> str:
-    """The workspace of one of the SETS in words."""
-    box = machine_of(study.platform, name).workspace
+    """Description of the workspace of one of the SETS."""
+    box = with_workspace_of(study.platform, name).workspace
     assert box is not None
     unit = _unit(study)
     shifts = ", ".join(f"{low:g} to {high:g}" for low, high in box.translation)

@@ -5,11 +5,8 @@ from __future__ import annotations
 from gough.errors import GoughError
 from gough.learn.models.base import PoseNetwork, Scaling
 from gough.learn.models.disgnet import DisGNet
-from gough.learn.models.gcn import GCN
-from gough.learn.models.graphmlp import GraphMLP
-from gough.learn.models.plain_mlp import PlainMLP
-from gough.learn.models.resmlp import ResMLP
-from gough.learn.models.wise_mlp import WiseMLP
+from gough.learn.models.graph import GCN, GraphMLP
+from gough.learn.models.mlp import PlainMLP, ResMLP, WiseMLP
 from gough.platform import Platform
 
 MODELS: dict[str, type[PoseNetwork]] = {
@@ -20,7 +17,7 @@ __all__ = ["MODELS", "PoseNetwork", "Scaling", "build"]
 
 
 def build(kind: str, platform: Platform, scaling: Scaling, **options: object) -> PoseNetwork:
-    """A network by name, with its own options.
+    """Create a network by name, with its own options.
 
     Raises:
         GoughError: no such network, or an option it does not have.

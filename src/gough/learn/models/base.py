@@ -1,4 +1,4 @@
-"""What all first-guess networks share: readings in, pose relative to home out."""
+"""Base of the first-guess networks: readings in, pose from home out."""
 
 from __future__ import annotations
 
@@ -7,29 +7,31 @@ from itertools import product
 from typing import ClassVar, Literal
 
 import numpy as np
+import roma
 import torch
 from torch import Tensor, nn
 
 from gough import quaternion
 from gough.errors import GoughError
 from gough.kinematics import assembly_sign, leg_lengths
-from gough.learn.kinematics import euler_to_matrix, quaternion_to_matrix
-from gough.learn.rotation import nearest_rotation
+from gough.learn.kinematics import euler_to_matrix
 from gough.platform import Platform
 from gough.pose import Pose
 
 Rotation = Literal["quaternion", "nine", "euler"]
 OUTPUTS = {"quaternion": 7, "nine": 12, "euler": 6}
 SCALING_POSES = 20_000
-WIDER = 0.03  # of the range of readings, to either side
+WIDER = 0.03  # share by which the range of readings is widened to either side
 
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """How a platform's readings and poses become numbers of order one.
+    """Constants that scale a platform's readings and poses to numbers of order one.
+
+    The names are part of the format of network files.
 
     Attributes:
-        leg_mean, leg_std: (6,) of the readings over the workspace.
+        leg_mean, leg_std: (6,) mean and deviation of the readings over the workspace.
         leg_range: (6, 2) lowest and highest reading over the workspace.
         shift_mean, shift_scale: (3,) middle and half width of the workspace's translations.
         turn_scale: (3,) largest Euler angle of the workspace to either side [rad].
@@ -44,7 +46,7 @@ class Scaling:
 
     @classmethod
     def of(cls, platform: Platform, same_assembly: bool = False) -> Scaling:
-        """From 20,000 poses of the workspace, always the same.
+        """Compute the constants from 20,000 poses of the workspace, always the same.
 
         Raises:
             PlatformError: the platform states no workspace.
@@ -74,16 +76,16 @@ class Scaling:
 
 
 def reading_range(platform: Platform) -> np.ndarray:
-    """(6, 2) lowest and highest reading over the workspace, a little widened.
+    """Lowest and highest reading (6, 2) over the workspace, widened a little.
 
-    Over sampled poses and the corners of the box, where the extremes mostly are.
+    The poses are samples and the corners of the box, where the extremes mostly are.
     """
     box = platform._workspace()
     edges = np.concatenate([box.translation, np.radians(box.rotation_deg)])  # (6, 2)
     corners = np.array(list(product(*edges)))  # (64, 6)
-    turns = Pose.from_euler(np.zeros(3), corners[:, 3:]).wxyz
+    rotations = quaternion.from_euler(corners[:, 3:])
     home = platform.home
-    poses = Pose(home.position + corners[:, :3], quaternion.product(home.wxyz, turns))
+    poses = Pose(home.position + corners[:, :3], quaternion.product(home.wxyz, rotations))
     samples = platform.sample_poses(SCALING_POSES, seed=0)
     legs = np.concatenate([leg_lengths(platform, p) for p in (poses, samples)])
     low, high = np.nanmin(legs, axis=0), np.nanmax(legs, axis=0)
@@ -92,12 +94,13 @@ def reading_range(platform: Platform) -> np.ndarray:
 
 
 class PoseNetwork(nn.Module):
-    """A network from readings (N, 6) to poses relative to home.
+    """A network from readings (N, 6) to poses from home.
 
     A subclass defines `network`, from normalised readings (N, 6) to raw numbers (N, outputs):
-    three for the scaled shift from home, and then, by `rotation`, four for a quaternion
-    (normalised), nine for a matrix (the nearest rotation is taken, 9D-SVD) or three for
-    scaled Euler angles. Its keyword arguments with their defaults are its configuration.
+    three for the scaled translation from home, and then, by `rotation`, four for a quaternion
+    (normalised), nine for a matrix (replaced by the nearest rotation: Levinson et al., An Analysis
+    of SVD for Deep Rotation Estimation (2020)) or three for scaled Euler angles. Its keyword
+    arguments with their defaults are its configuration.
     """
 
     kind: ClassVar[str]
@@ -118,16 +121,16 @@ class PoseNetwork(nn.Module):
 
     @property
     def outputs(self) -> int:
-        """How many raw numbers describe a pose."""
+        """Number of raw numbers that describe a pose."""
         return OUTPUTS[self.rotation]
 
     @property
     def dtype(self) -> torch.dtype:
-        """The dtype of the weights; readings and poses are float64 whatever it is."""
+        """The dtype of the weights; readings and poses are float64 in any case."""
         return next(self.parameters()).dtype
 
     def cast(self, dtype: torch.dtype) -> None:
-        """Change the dtype of the weights; that of scales and distances stays."""
+        """Change the dtype of the weights, not that of scales and distances."""
         kept = self.state_dict().keys()
         exact = {n: b for n, b in self.named_buffers() if n not in kept}
         self.to(dtype)
@@ -145,21 +148,26 @@ class PoseNetwork(nn.Module):
         return self.network(x.to(self.dtype)).double()
 
     def forward(self, legs: Tensor) -> tuple[Tensor, Tensor]:
-        """Shift (N, 3) [unit] and turn (N, 3, 3), float64, for readings (N, 6), float64."""
+        """Translation (N, 3) [platform unit] and rotation (N, 3, 3) from home, for readings (N, 6).
+
+        All are float64.
+        """
         return self.decode(self.raw(legs))
 
     def decode(self, raw: Tensor) -> tuple[Tensor, Tensor]:
-        """Shift (N, 3) [unit] and turn (N, 3, 3) that raw numbers (N, outputs) stand for."""
-        shift = self.shift_mean + self.shift_scale * raw[:, :3]
+        """Translation (N, 3) [platform unit] and rotation (N, 3, 3) of raw numbers (N, outputs)."""
+        translation = self.shift_mean + self.shift_scale * raw[:, :3]
         rest = raw[:, 3:]
         if self.rotation == "quaternion":
-            return shift, quaternion_to_matrix(nn.functional.normalize(rest, dim=-1))
+            xyzw = nn.functional.normalize(roma.quat_wxyz_to_xyzw(rest), dim=-1)
+            return translation, roma.unitquat_to_rotmat(xyzw)
         if self.rotation == "euler":
-            return shift, euler_to_matrix(self.turn_scale * rest)
-        return shift, nearest_rotation(rest.unflatten(-1, (3, 3)))
+            return translation, euler_to_matrix(self.turn_scale * rest)
+        nearest = roma.special_procrustes(rest.unflatten(-1, (3, 3)))
+        return translation, nearest  # pyright: ignore[reportReturnType]
 
     def start_near_home(self, last: nn.Linear) -> None:
-        """Make the last layer's first outputs small, about no turn."""
+        """Initialise the last layer so that its outputs are close to the home pose."""
         home = {"quaternion": (1.0, 0, 0, 0), "nine": (1.0, 0, 0, 0, 1, 0, 0, 0, 1)}
         with torch.no_grad():
             last.weight.mul_(0.1)
@@ -168,5 +176,5 @@ class PoseNetwork(nn.Module):
                 last.bias[3:] = torch.tensor(home[self.rotation])
 
     def parameter_count(self) -> int:
-        """How many numbers training can change."""
+        """Number of trained parameters."""
         return sum(p.numel() for p in self.parameters())

@@ -26,9 +26,9 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from gough.learn.graph import NODES
+from gough.learn.data import NODES
 from gough.learn.models.base import Scaling
-from gough.learn.models.graph_base import GraphNetwork
+from gough.learn.models.graph import GraphNetwork
 from gough.learn.models.layers import Dense, RadialBasis, Standardise, dense_stack
 from gough.platform import Platform
 

@@ -1,4 +1,4 @@
-"""The few layers that the networks are made of."""
+"""Layers of the networks."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Dense(nn.Module):
 
 
 def dense_stack(inputs: int, width: int, layers: int, *, norm: bool = True) -> nn.Sequential:
-    """`layers` dense layers from `inputs` to `width` and on at that width."""
+    """Stack `layers` dense layers: from `inputs` features to `width`, then at that width."""
     sizes = [inputs] + [width] * layers
     return nn.Sequential(*(Dense(a, b, norm=norm) for a, b in pairwise(sizes)))
 
 
 class RadialBasis(nn.Module):
-    """Distances as the heights of evenly spaced bumps: (...) to (..., count).
+    """Gaussian features of distances, with evenly spaced centres: (...) to (..., count).
 
     Args:
         count: number of Gaussians.
@@ -50,7 +50,7 @@ class RadialBasis(nn.Module):
 
 
 class Standardise(nn.Module):
-    """gain * x + bias, started so that its output has mean 0 and spread 1 over given samples."""
+    """gain * x + bias, initialised so that its output has mean 0 and deviation 1 over samples."""
 
     def __init__(self, width: int) -> None:
         super().__init__()

@@ -7,8 +7,8 @@ from pathlib import Path
 import torch
 
 from gough.errors import GoughError
-from gough.learn.checkpoint import load_tensors, save_tensors
-from gough.learn.export import NETWORK, WEIGHTS, finish_onnx, quiet
+from gough.learn.export import finish_onnx, quiet
+from gough.learn.run_folder import NETWORK, WEIGHTS, load_tensors, save_tensors
 from gough.learn.universal.network import Universal
 from gough.platform import Platform
 from gough.seeds.network import FORMAT

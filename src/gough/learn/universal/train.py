@@ -28,11 +28,9 @@ from torch import Tensor
 from tyro.conf import Positional
 
 from gough.errors import GoughError
-from gough.learn.checkpoint import load_state, save_state
 from gough.learn.config import OptimiserConfig, RunConfig
-from gough.learn.environment import environment
-from gough.learn.optim import SOAP
-from gough.learn.schedule import Clock, learning_rate
+from gough.learn.optim import SOAP, Clock, learning_rate
+from gough.learn.run_folder import environment, load_state, save_state
 from gough.learn.universal.export import export
 from gough.learn.universal.machines import Draw, Machines, Poses
 from gough.learn.universal.network import Universal

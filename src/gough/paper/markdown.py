@@ -1,4 +1,4 @@
-"""Markdown tables and lines, and the page that opens by itself."""
+"""Markdown tables and numbers, and a page of HTML that needs no other file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ h1, h2 {{ line-height: 1.2; }}
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A Markdown table; the first column is text, the others are numbers.
+    """Write a Markdown table; the first column is text, the others are numbers.
 
     Raises:
         ValueError: a row with another number of cells, or an empty cell.
@@ -48,7 +48,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number to some significant digits, plainly written where that is short."""
+    """Write a number to some significant digits, without exponent where that is short."""
     if value is None:
         return NOTHING
     if value == 0:
@@ -59,17 +59,17 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def percent(share: float, places: int = 1) -> str:
-    """A share as per cent."""
+    """Write a share as per cent."""
     return f"{100 * share:.{places}f}"
 
 
 def milliseconds(seconds: float) -> str:
-    """A time in ms to three digits."""
+    """Write a time [s] in ms to three digits."""
     return number(1e3 * seconds)
 
 
 def page(markdown: str, title: str, folder: Path) -> str:
-    """One HTML page of Markdown, its SVG figures inside."""
+    """Convert Markdown to one HTML page with its SVG figures inside."""
     from markdown_it import MarkdownIt
 
     body = MarkdownIt("commonmark").enable("table").render(markdown)
@@ -84,7 +84,7 @@ def page(markdown: str, title: str, folder: Path) -> str:
 
 
 def _inline(path: Path, words: str, name: str) -> str:
-    """An SVG picture as part of the page; its ids made its own, for several share a page."""
+    """An SVG picture as part of the page, its ids prefixed, since several share a page."""
     text = path.read_text(encoding="utf-8")
     text = text[text.index("<svg") :]
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", text)

@@ -1,0 +1,110 @@
+"""gough evaluate: first guesses side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional
+
+from gough.commands.options import PlatformName, SameAssembly, WorkspaceBox, option
+
+if TYPE_CHECKING:
+    from gough.learn.evaluate import Row
+    from gough.platform import Platform
+
+
+def run(
+    names: Positional[tuple[str, ...]] = (),
+    *,
+    platform: PlatformName = "reference",
+    poses: int = 100_000,
+    workspace: WorkspaceBox = None,
+    same_assembly: SameAssembly = False,
+    train_peers: Annotated[str | None, option(metavar="TIME")] = None,
+    folder: Path = Path("runs/peers"),
+    json: Annotated[Path | None, option(metavar="FILE")] = None,
+    speed: bool = False,
+) -> int:
+    """Compare first guesses: errors, where Newton's method ends, time.
+
+    gough evaluate
+
+    gough evaluate runs/mine polynomial-5 -p my.toml
+
+    Args:
+        names: Compare these: home, taylor-2, polynomial-3 (any degree to 7), universal, a network
+            that comes with the package, the folder of a run. Without names all there are for the
+            platform.
+        poses: Measure errors over this many held-out poses.
+        train_peers: First train every network for this time, such as 4m.
+        folder: Train them in this folder.
+        json: Write all numbers to this file.
+        speed: Time the forms of DisGNet instead: dense, structured, tables.
+    """
+    from gough.learn import evaluate as loop
+    from gough.platform import Platform
+
+    machine = Platform.load(platform)
+    if workspace is not None:
+        machine = machine.with_workspace(*workspace)
+    if speed:
+        print("\n".join(loop.measure_speed(machine).lines()))
+        return 0
+    chosen = list(names) or loop.default_names(machine)
+    if train_peers is not None:
+        chosen += loop.train_peers(machine, folder, train_peers)
+    rows = loop.evaluate(machine, chosen, poses=poses, same_assembly=same_assembly)
+    _print(machine, rows)
+    if json is not None:
+        from gough.whole_file import write_whole
+
+        write_whole(json, loop.to_json(rows).encode())
+    return 0
+
+
+def _print(platform: Platform, rows: Sequence[Row]) -> None:
+    """Two tables of at most 80 columns: errors, and where solvers end from the guesses."""
+    from gough.commands.show import console, plain_table
+
+    screen, unit = console(), platform.unit or "unit"
+    screen.print(
+        f"First guesses for {platform.name}, {rows[0].metrics.count:,} held-out poses: errors in "
+        f"{unit} and deg",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip
+    errors = plain_table(
+        "first guess", ">numbers", ">E-trans", ">median", ">worst", f">< 1 {unit}", ">E-rot",
+        ">worst", ">E-ik",
+    )  # fmt: skip
+    ends = plain_table(
+        "first guess", ">true pose", ">other", ">twins", ">no end", ">solve", ">ms/1000",
+        ">training s", ">seed",
+    )  # fmt: skip
+    for row in rows:
+        m, n = row.metrics, row.newton
+        name = row.name.rstrip("/").rpartition("/")[2][-14:]
+        values = [m.trans_mean, m.trans_median, m.trans_worst]
+        errors.add_row(
+            name, _optional(row.parameters, ",d"), *(f"{v:.3g}" for v in values),
+            f"{100 * m.trans_within[1]:.4g} %",
+            *(f"{v:.3g}" for v in (m.rot_mean, m.rot_worst, m.ik_mean)),
+        )  # fmt: skip
+        ends.add_row(
+            name, f"{100 * n.share:.4f} %", str(n.other), str(n.twins), str(n.unconverged),
+            str(row.wrong), f"{1e3 * row.per_thousand:.2f}", _optional(row.seconds, ",.1f"),
+            _optional(row.seed, "d"),
+        )  # fmt: skip
+    screen.print(errors)
+    screen.print(
+        "\nNewton's method from them without a second try: true pose, another pose (twins: in the\n"
+        "workspace, too), no convergence. solve: rows that gough.solve does not end at the true\n"
+        "pose. ms/1000: time of 1,000 guesses in one call.",
+        markup=False,
+    )  # fmt: skip
+    screen.print(ends)
+
+
+def _optional(value: float | None, spec: str) -> str:
+    return "-" if value is None else f"{value:{spec}}"
