@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    names: Positional[tuple[str, ...]] = (),
+    names: Annotated[Positional[tuple[str, ...]], option(metavar="[NAME ...]")] = (),
     *,
     platform: PlatformName = "reference",
     poses: int = 100_000,
