@@ -176,6 +176,14 @@ def write(platform: Platform, folder: Path, real: RealName = "double") -> None:
         (folder / name).write_text(text, "utf-8")
 
 
+def hostile(folder: Path) -> Path:
+    """Compile `hostile.c` with a machine that was written to `folder`, under the sanitizers."""
+    program = folder / "hostile"
+    run(["gcc", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-I{folder}",
+         HERE / "hostile.c", "-o", program, "-lm"])  # fmt: skip
+    return program
+
+
 def footprint(folder: Path, flags: Sequence[str], level: str = "-O2") -> tuple[int, int]:
     """Code and deepest stack [bytes] of an exported machine on a Cortex-M.
 

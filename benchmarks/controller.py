@@ -1,0 +1,198 @@
+"""The exported C beside the Python tracker: events, digits, times, sizes, hostile readings.
+
+    python benchmarks/controller.py            # some ten minutes; needs gcc
+    python benchmarks/controller.py --quick    # a hundredth of the readings
+
+Says which compiler each number is of. Clang and arm-none-eabi-gcc are used where installed. Keep
+the machine otherwise idle for the times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+import exported
+from exported import Rows, build, drives
+from solver import processor
+
+import gough
+from gough import Platform, Status, Tracker
+from gough.export.tables import MAX_STEPS
+
+ARM = {
+    "Cortex-M7, double": ("double", "-mcpu=cortex-m7", "-mfpu=fpv5-d16"),
+    "Cortex-M4, float": ("float", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"),
+}
+AGAIN = 30  # cycles within which both trackers must agree again
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="The exported C beside the Python tracker.")
+    parser.add_argument("--quick", action="store_true", help="a hundredth of the readings")
+    count = 10_000 if parser.parse_args().quick else 1_000_000
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        print(f"{processor()}; {version('gcc')}\n")
+        speed_table(folder, min(count // 10, 20_000))
+        home_table(folder, count // 10)
+        size_table(folder)
+        hostile_table(folder, count)
+        event_table(folder, count)
+
+
+def version(compiler: str) -> str:
+    """The first line that a compiler says of itself."""
+    return exported.run([compiler, "--version"]).splitlines()[0]
+
+
+# ---- events and digits ----------------------------------------------------------------
+
+
+def event_table(folder: Path, count: int) -> None:
+    """Half of `count` readings clean, half with faults, on every machine of the catalog."""
+    print(f"| {count:,} readings, half of them with faults | the same event as in Python | "
+          "other starts involved, longest until equal again | unexplained | position error / size, "
+          "double; float | rotation error, rad, double; float |")  # fmt: skip
+    print("|---|---|---|---|---|---|")
+    for name in Platform.catalog():
+        platform = Platform.load(name)
+        path = drives.path(platform, count // 2, seed=1)
+        parts = [gough.leg_lengths(platform, path), drives.faulty(platform, path, seed=2)]
+        legs = np.concatenate(parts)
+        found = {real: compare(platform, legs, folder / name, real) for real in ("double", "float")}
+        same, longest, unexplained, *_ = found["double"]
+        other = f"{count - same:,}, {longest} cycles" if count - same else "none"
+        errors = ["; ".join(f"{found[real][k]:.1e}" for real in found) for k in (3, 4)]
+        print(f"| {name} | {same:,} | {other} | {unexplained} | {errors[0]} | {errors[1]} |",
+              flush=True)  # fmt: skip
+
+
+def compare(platform: Platform, legs: np.ndarray, folder: Path, real) -> tuple:
+    """Cycles with equal events, longest disagreement, those that no start explains, errors."""
+    machine = build(platform, folder / real, real=real)
+    legs = legs.astype(machine.real).astype(float)
+    poses, events, _ = drives.tracked(Tracker(platform), legs)
+    rows = machine.track(legs)
+    shift, turn = rows.pose.distance(poses)
+    same = rows.event == events
+    agree = same & (shift <= 1e-5 * platform.size)
+    longest, unexplained = disagreements(agree, rows)
+    return (int(same.sum()), longest, unexplained, (shift[agree] / platform.size).max(),
+            turn[agree].max())  # fmt: skip
+
+
+def disagreements(agree: np.ndarray, rows: Rows) -> tuple[int, int]:
+    """Length of the longest run of cycles that differ, and how many runs involve no other start."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], agree, [True]]).astype(int)))
+    runs = list(zip(edges[::2], edges[1::2], strict=True))
+    unexplained = sum(not np.any(rows.next_start[max(a - 1, 0) : b] > 0) for a, b in runs)
+    return max((b - a for a, b in runs), default=0), unexplained
+
+
+# ---- times ----------------------------------------------------------------------------
+
+
+def speed_table(folder: Path, count: int) -> None:
+    """One warm cycle: shortest of nine runs of each, and the Python tracker's."""
+    print("| one cycle of the tracker | median | 99.9th percentile | longest |")
+    print("|---|---|---|---|")
+    for name in ("reference", "rubin_camera", "reachy_mini"):
+        platform = Platform.load(name)
+        path = drives.path(platform, count, seed=3)
+        legs = gough.leg_lengths(platform, path)
+        times = {"Python": python_times(platform, legs)}
+        for compiler in exported.compilers():
+            for real in ("double", "float"):
+                at = folder / f"{name}_{compiler}_{real}"
+                machine = build(platform, at, real=real, compiler=compiler)
+                times[f"{compiler} -O3, {real}"] = machine.times(legs, path[0])
+        for label, each in times.items():
+            middle, tail, most = np.percentile(each, [50, 99.9, 100]) / 1e3
+            print(f"| {name}, {label} | {middle:.2f} us | {tail:.2f} us | {most:.2f} us |",
+                  flush=True)  # fmt: skip
+    print()
+
+
+def python_times(platform: Platform, legs: np.ndarray) -> np.ndarray:
+    """Time of each cycle of the Python tracker [ns], the first hundred left out."""
+    tracker, times = Tracker(platform), np.empty(len(legs))
+    for i, row in enumerate(legs):
+        begin = time.perf_counter_ns()
+        tracker.update(row)
+        times[i] = time.perf_counter_ns() - begin
+    return times[100:]
+
+
+# ---- from far away --------------------------------------------------------------------
+
+
+def home_table(folder: Path, count: int) -> None:
+    """LinuxCNC's hexapod from home, over a workspace wider than any machine's."""
+    platform = Platform.load("linuxcnc_genhex").with_workspace(100 / 25.4, 60.0)
+    pose = platform.sample_poses(count, seed=5)
+    pose = pose[gough.assembly_sign(platform, pose) > 0]
+    legs = gough.leg_lengths(platform, pose)
+    print(f"| linuxcnc_genhex, +-100 mm, +-60 deg, {len(pose):,} poses with home's sign of det J, "
+          "from home | true pose | another, called usable | another, called so | none "
+          "| steps, mean and most |")  # fmt: skip
+    print("|---|---|---|---|---|---|")
+    for real, near in (("double", 1e-9), ("float", 1e-4)):
+        machine = build(platform, folder / f"home_{real}", real=real)
+        rows = machine.solve(legs, platform.home)
+        true = rows.pose.distance(pose)[0] < near * platform.size
+        usable, failed = rows.status <= Status.NEAR_SINGULARITY, rows.status > 3
+        shares = [true, ~true & usable, ~true & ~usable & ~failed, failed]
+        cells = " | ".join(f"{np.mean(share):.3%}" for share in shares)
+        print(f"| {real} | {cells} | {rows.steps.mean():.2f}, {rows.steps.max()} |", flush=True)
+        assert rows.steps.max() <= MAX_STEPS
+    print()
+
+
+# ---- sizes ----------------------------------------------------------------------------
+
+
+def size_table(folder: Path) -> None:
+    """Code and stack on two microcontrollers."""
+    if not shutil.which("arm-none-eabi-gcc"):
+        print("arm-none-eabi-gcc is not installed: no sizes\n")
+        return
+    print(f"{version('arm-none-eabi-gcc')}\n")
+    print("| machine | code, -O2 | code, -Os | stack, -O2 |")
+    print("|---|---|---|---|")
+    for label, (real, *flags) in ARM.items():
+        flags += ["-mfloat-abi=hard", "-mthumb"]
+        for name in ("reference", "rubin_camera", "reachy_mini"):
+            at = folder / f"arm_{name}_{real}"
+            exported.write(Platform.load(name), at, real)
+            code, stack = exported.footprint(at, flags)
+            small, _ = exported.footprint(at, flags, "-Os")
+            print(f"| {label}, {name} | {code:,} B | {small:,} B | {stack:,} B |", flush=True)
+    print()
+
+
+# ---- hostile readings -----------------------------------------------------------------
+
+
+def hostile_table(folder: Path, count: int) -> None:
+    """Readings that no machine gives, under the address and undefined-behaviour sanitizers."""
+    print("| gcc -fsanitize=address,undefined | said |")
+    print("|---|---|")
+    for name in ("reference", "rubin_camera", "reachy_mini"):
+        for real in ("double", "float"):
+            at = folder / f"hostile_{name}_{real}"
+            exported.write(Platform.load(name), at, real)
+            said = exported.run([exported.hostile(at), str(count)]).strip()
+            print(f"| {name}, {real} | {said} |", flush=True)
+    print()
+
+
+if __name__ == "__main__":
+    main()
