@@ -242,6 +242,10 @@ WRONG_TOML = {
         "stroke = [1.0, 2.0]\n" + ROTARY_TOML,
         "stroke[0]: forbids the home pose: motor angles at home are ",
     ),
+    "motor stroke in degrees": (
+        "stroke = [-45.0, 60.0]\n" + ROTARY_TOML,
+        "stroke: motor angles are in rad, and -45 is more than a turn; if it is degrees, write -0.78",
+    ),
 }  # fmt: skip
 
 

@@ -294,6 +294,13 @@ class Platform:
             raise PlatformError(
                 f"stroke: expected [lowest, highest] or six such pairs, got shape {limits.shape}"
             )
+        turns = np.isfinite(limits) & (np.abs(limits) > 2 * np.pi)
+        if self.legs == "rotary" and np.any(turns):
+            found = limits[turns].flat[0]
+            raise PlatformError(
+                f"stroke: motor angles are in rad, and {found:g} is more than a turn; if it is "
+                f"degrees, write {np.radians(found):.6g}"
+            )
         readings = "motor angles" if self.legs == "rotary" else "leg readings"
         limits = frozen(np.broadcast_to(limits, (6, 2)) + 0.0)
         for i, ((low, high), home) in enumerate(zip(limits, self.home_legs, strict=True)):

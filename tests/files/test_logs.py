@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import logging
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from logs import make
 
+from gough.columns import LEGS
 from gough.errors import InputError
 from gough.files import LogFormat, Reading, inverse_file, read_legs
+from gough.files.trajectory import open_trajectory
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
 
@@ -124,3 +128,23 @@ def test_columns_by_number_that_are_not_the_ones_called_legs_are_refused():
     reading = Reading(log=LogFormat(columns=(1, 2, 3, 4, 5, 6)))
     with pytest.raises(InputError, match="not those called leg_1 to leg_6"):
         read_legs(make.FOLDER / "plain.csv", make.press(), reading)
+
+
+def test_date_and_time_are_seconds(tmp_path):
+    platform = make.press()
+    with open_trajectory(make.FOLDER / "stamps.csv", platform, time="timestamp") as file:
+        times = np.concatenate([rows[:, 1] for rows in file.blocks()])
+    start = datetime(2026, 11, 24, 10, 2, 11, 250_000, tzinfo=UTC).timestamp()
+    np.testing.assert_allclose(times, start + np.arange(8))
+    stamps = pa.array([1, None], pa.timestamp("ms"))
+    legs = {name: [27.0, 26.0] for name in LEGS}
+    pq.write_table(pa.table({"time": stamps, **legs}), tmp_path / "legs.parquet")
+    with open_trajectory(tmp_path / "legs.parquet", platform, time="time") as file:
+        np.testing.assert_array_equal(next(file.blocks())[:, 1], [0.001, np.nan])
+    path = tmp_path / "legs.csv"
+    path.write_text("t,L1,L2,L3,L4,L5,L6\n10:2,27,27,27,27,27,27\n")
+    with (
+        open_trajectory(path, platform, time="t") as file,
+        pytest.raises(InputError, match="line 2: column t: found '10:2', expected a number or"),
+    ):
+        next(file.blocks())

@@ -18,12 +18,10 @@ import pyarrow.csv as pacsv
 from gough.errors import GoughError, InputError
 from gough.files.layout import BLANKS, as_utf8, check_text, find_layout
 from gough.files.log_format import LogFormat
-from gough.files.rows import Block, Conversions
+from gough.files.rows import MISSING, Block, Conversions
 
 HEAD = 1 << 16  # bytes read to find the header
 LONGEST_LINE = 1 << 24  # bytes; a "line" beyond it means wrong line ends or an open quote
-# text that stands for "no value" in a number column
-MISSING = ("", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
 
 
 class CsvSource:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Protocol
 
 import numpy as np
 import pyarrow as pa
 
 from gough.checks import Array
-from gough.errors import GoughError
+from gough.errors import GoughError, InputError
 from gough.files.log_format import LogFormat
 from gough.tables import arrow_values
 
+# text that stands for "no value" in a number column
+MISSING = ("", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
 Conversions = dict[str, tuple[float, float]]
 
 
@@ -72,6 +75,38 @@ class Block:
                 array[:, i] = factor * array[:, i] + offset
         array[list(self.bad)] = np.nan
         return array
+
+    def times(self, name: str) -> Array:
+        """A column of times (N,) [s], NaN where absent: numbers, or date and time as in ISO 8601.
+
+        Dates and times are counted from 1970-01-01, in UTC where no zone is stated.
+
+        Raises:
+            InputError: a text that is neither; with its place.
+        """
+        column = self.table.column(name)
+        if pa.types.is_timestamp(column.type):
+            return arrow_values(column.cast(pa.timestamp("us")).cast(pa.int64())) / 1e6
+        if not pa.types.is_string(column.type):
+            return self.numbers([name])[:, 0]
+        seconds = np.full(len(self), np.nan)
+        for row, text in enumerate(column.to_pylist()):
+            if row not in self.bad and text and text.strip() not in MISSING:
+                try:
+                    seconds[row] = _seconds(text.strip())
+                except ValueError:
+                    raise InputError(
+                        f"{self.place(row)}: column {name}: found {text[:40]!r}, expected a number "
+                        "or a time such as 2026-11-24T10:02:11.5"
+                    ) from None
+        return seconds
+
+
+def _seconds(text: str) -> float:
+    if ":" not in text:
+        return float(text.replace(",", "."))
+    moment = datetime.fromisoformat(text)
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 class Source(Protocol):

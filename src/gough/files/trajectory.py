@@ -87,12 +87,12 @@ class TrajectoryFile:
             progress: called after every block.
         """
         time, count = self.time, 0
-        numbers = (*self.columns, *([] if time is None else [time]))
-        for block in read_columns(self.source, numbers, self.reading):
+        keep = () if time is None else (time,)
+        for block in read_columns(self.source, self.columns, self.reading, keep):
             rows = np.full((len(block), 3 + len(self.columns)), np.nan)
             rows[:, 0] = np.arange(count + 1, count + 1 + len(block))
             if time is not None:
-                rows[:, 1] = block.numbers([time])[:, 0]
+                rows[:, 1] = block.times(time)
             rows[:, 2] = unusable_status(block)
             rows[:, 3:] = block.numbers(self.columns)
             if count == 0 and not self.has_poses:
@@ -161,9 +161,11 @@ def open_trajectory(
         yield TrajectoryFile(source, platform, columns, time, seed, reading)
 
 
-def read_columns(source: Source, names: tuple[str, ...], reading: Reading) -> Iterator[Block]:
+def read_columns(
+    source: Source, names: tuple[str, ...], reading: Reading, keep: tuple[str, ...] = ()
+) -> Iterator[Block]:
     """Read number columns of an open file, with its column of statuses if it has one."""
-    keep = (STATUS,) if STATUS in source.columns and STATUS not in names else ()
+    keep += (STATUS,) if STATUS in source.columns and STATUS not in names else ()
     numbers = tuple(dict.fromkeys(names))
     return source.blocks(numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
 
