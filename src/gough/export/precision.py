@@ -57,7 +57,7 @@ PRECISIONS = {
         cosine_slack=4e-16, rounding=1e-14, pose_error=1e-12,
     ),
     # chosen so that rounding (6e-8) neither stops a good pose nor lets a bad one pass: see
-    # tests/export/test_float.py
+    # tests/export/test_c.py
     "float": Precision(
         "float", "f", tolerance=2e-6, small_step=1e-9, negligible=1e-6,
         tiny=1e-30, slack=2e-6, cosine_slack=4e-7, rounding=1e-6, pose_error=2e-6,
