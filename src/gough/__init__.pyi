@@ -6,6 +6,7 @@ from .errors import GoughError as GoughError
 from .errors import InputError as InputError
 from .errors import PlatformError as PlatformError
 from .fk.solution import Solution as Solution
+from .fk.solve import Solver as Solver
 from .fk.solve import solve as solve
 from .fk.tracker import Tracker as Tracker
 from .kinematics import assembly_sign as assembly_sign
@@ -21,10 +22,10 @@ from .modes.result import AssemblyModes as AssemblyModes
 from .platform import Platform as Platform
 from .pose import Pose as Pose
 from .rotary import RotaryArms as RotaryArms
-from .seeds.base import PolynomialSeed as PolynomialSeed
 from .seeds.base import PoseSeed as PoseSeed
 from .seeds.base import Seed as Seed
 from .seeds.network import NetworkSeed as NetworkSeed
+from .seeds.polynomial import PolynomialSeed as PolynomialSeed
 from .status import Event as Event
 from .status import ModesStatus as ModesStatus
 from .status import Status as Status

@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough import struts
+from gough import limit_rules, struts
 from gough.checks import Array, frozen, one_or_six, platform_field, platform_numbers
 from gough.errors import PlatformError
 from gough.pose import Pose
@@ -231,11 +231,9 @@ class Platform:
         """Whether poses (...) are in the workspace; True where none is stated.
 
         The box is widened by 1e-9 of the platform's size, so that poses on its faces count
-        as inside in spite of rounding.
+        as inside in spite of rounding (see `gough.limit_rules`).
         """
-        if self.workspace is None:
-            return np.ones(pose.batch, dtype=bool)
-        return self.workspace.contains(self.home, pose, 1e-9 * self.size, 1e-9)
+        return limit_rules.in_workspace(self, pose)
 
     def _workspace(self) -> Workspace:
         if self.workspace is None:

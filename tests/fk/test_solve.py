@@ -328,9 +328,9 @@ def test_few_iterations_are_few():
 def test_tolerance_is_kept():
     platform = gough.Platform.load("reference")
     _, legs = _legs(platform, 200)
-    loose = gough.solve(platform, legs, seed="home", tol=1e-3)
+    loose = gough.solve(platform, legs, seed="home", tolerance=1e-3)
     assert loose.residual.max() <= 1e-3 * platform.size
-    assert np.all(gough.solve(platform, legs, tol=1e-15).residual < 1e-14 * platform.size)
+    assert np.all(gough.solve(platform, legs, tolerance=1e-15).residual < 1e-14 * platform.size)
 
 
 def test_given_poses_start_each_row():
@@ -366,8 +366,8 @@ def test_a_useless_seed_does_not_mislead():
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"tol": -1}, "tol: expected 0 to 1, found -1"),
-        ({"tol": float("nan")}, "tol: expected 0 to 1, found nan"),
+        ({"tolerance": -1}, "tolerance: expected 0 to 1, found -1"),
+        ({"tolerance": float("nan")}, "tolerance: expected 0 to 1, found nan"),
         ({"max_iterations": -1}, "max_iterations: expected 0 to 10000, found -1"),
         ({"restarts": 1e9}, "restarts"),
         ({"seed": "magic"}, "unknown name 'magic'; expected auto, home"),
@@ -447,7 +447,7 @@ def test_what_has_no_pose_is_not_certified():
     assert solution.radius is not None
     np.testing.assert_array_equal(solution.radius > 0, [True, False, True, False, True, True])
     np.testing.assert_array_equal(solution.status[[1, 3]], [6, 4])
-    loose = gough.solve(platform, legs[0] + 5, tol=1e-2, certify=True)
+    loose = gough.solve(platform, legs[0] + 5, tolerance=1e-2, certify=True)
     assert loose.residual > 0 or loose.status == Status.CERTIFIED
     assert gough.solve(platform, legs[0], certify=True).status == Status.CERTIFIED
     assert gough.solve(platform, legs[0]).radius is None

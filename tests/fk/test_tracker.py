@@ -2,6 +2,7 @@
 
 import threading
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 import gough
 from gough import Event, Status
-from gough.kernel import constants as geometry
+from gough.kernel.constants import to_internal
 
 
 @pytest.fixture
@@ -125,7 +126,7 @@ def test_crossing_a_singularity_is_called_a_change_of_mode():
     tracker.update(gough.leg_lengths(platform, before))
     assert tracker.event == Event.FOLLOWED
     # the neighbour across has other legs: give the tracker a state that Newton carries over
-    tracker._state[0, :7] = geometry.to_internal(tracker._constants, beyond)
+    tracker._state[0, :7] = to_internal(tracker._constants, beyond)
     tracker.update(gough.leg_lengths(platform, beyond))
     assert tracker.event == Event.MODE_CHANGED
     assert "singularity" in tracker.event.text
@@ -234,3 +235,16 @@ def test_every_event_has_a_sentence():
     for event in Event:
         assert event.text.endswith(".")
         assert len(event.text) > 30
+
+
+def test_the_limit_of_a_cycle_is_the_pivots_translation(reference):
+    """A rotation about a far pivot moves the joints a lot and the pose's position not at all."""
+    platform = replace(reference, pivot=(0.0, 0.0, 2_000.0))
+    assert platform.home.position[2] == 600
+    pose = gough.Pose.from_euler(platform.home.position + np.array([0, 0, 0.5]), [0.01, 0, 0])
+    tracker = gough.Tracker(platform, start=platform.home, max_shift=1.0)
+    tracker.update(gough.leg_lengths(platform, pose))
+    assert tracker.event == Event.FOLLOWED
+    further = gough.Pose.from_euler(pose.position + np.array([0, 0, 1.5]), [0.01, 0, 0])
+    tracker.update(gough.leg_lengths(platform, further))
+    assert tracker.event == Event.JUMPED

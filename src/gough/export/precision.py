@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 
 from gough.errors import GoughError
-from gough.fk.bulk import Settings
-from gough.kernel import constants, descent, equations
+from gough.fk.solve import Solver
+from gough.kernel import descent, equations
+from gough.limit_rules import SLACK
 
 RealName = Literal["double", "float"]
 
@@ -52,8 +53,8 @@ class Precision:
 PRECISIONS = {
     # what the Python solver uses
     "double": Precision(
-        "double", "", tolerance=Settings.tol, small_step=equations.SMALL,
-        negligible=descent.NEGLIGIBLE, tiny=1e-300, slack=constants.SLACK,
+        "double", "", tolerance=Solver.tolerance, small_step=equations.SETTLED,
+        negligible=descent.NEGLIGIBLE, tiny=1e-300, slack=SLACK,
         cosine_slack=4e-16, rounding=1e-14, pose_error=1e-12,
     ),
     # chosen so that rounding (6e-8) neither stops a good pose nor lets a bad one pass: see

@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 from gough import quaternion
 from gough.checks import Array
 from gough.export.precision import Precision
-from gough.fk.bulk import other_starts
-from gough.kernel import constants as platform_constants
 from gough.kernel import cycle, descent, layout
+from gough.kernel.constants import SINGULAR, kernel_constants
+from gough.limit_rules import SLACK
 from gough.platform import Platform
+from gough.seeds.base import further_starts
 
 DESCENT_STEPS = 33  # in one call, beside the Newton steps of `cycle`
 MAX_STEPS = cycle.STEPS + DESCENT_STEPS
@@ -24,7 +25,7 @@ def constant_lines(platform: Platform, precision: Precision) -> str:
 
     Their values come from `kernel.constants`, their names say what they are.
     """
-    constants = platform_constants.constants(platform)
+    constants = kernel_constants(platform)
     order = constants[layout.ORDER : layout.ORDER + 6].astype(int)
     integers = {"ROTARY": int(platform.rotary is not None), "START_COUNT": START_COUNT}
     lines = [*_arithmetic(precision), "", *_limits(precision), ""]
@@ -45,8 +46,8 @@ def _tables(platform: Platform, c: Array, order: NDArray[np.intp]) -> dict[str, 
         "SIZE": c[layout.SIZE],
         "PER_SIZE": c[layout.PER_SIZE],
         "RADIUS": c[layout.RADIUS],
-        "HOME_SIGN": c[layout.REFERENCE],
-        "ENOUGH": c[layout.ENOUGH],
+        "HOME_SIGN": c[layout.HOME_SIGN],
+        "ENOUGH": c[layout.REGULAR_DETERMINANT],
         "PLATFORM_JOINTS": cut(layout.JOINTS, 6, 3),
         "BASE_JOINTS": cut(layout.FIXED, 6, 3),
         "PIVOT": cut(layout.PIVOT, 3),
@@ -54,12 +55,12 @@ def _tables(platform: Platform, c: Array, order: NDArray[np.intp]) -> dict[str, 
         "GAIN": cut(layout.GAIN, 6),
         "ZERO": cut(layout.ZERO, 6),
         "STROKE": cut(layout.STROKE, 6, 2),
-        "HOME_SHIFT": cut(layout.CENTRE, 3),
-        "HOME_INVERSE": quaternion.to_matrix(cut(layout.HOME, 4)).T.ravel(),
-        "SHIFT_LOW": cut(layout.SHIFT_LOW, 3),
-        "SHIFT_HIGH": cut(layout.SHIFT_HIGH, 3),
-        "TURN_RANGE": cut(layout.TURN, 3, 3),
-        "STARTS": other_starts(platform, START_COUNT),
+        "HOME_SHIFT": cut(layout.HOME_POSITION, 3),
+        "HOME_INVERSE": quaternion.to_matrix(cut(layout.HOME_QUATERNION, 4)).T.ravel(),
+        "SHIFT_LOW": cut(layout.BOX_LOW, 3),
+        "SHIFT_HIGH": cut(layout.BOX_HIGH, 3),
+        "TURN_RANGE": cut(layout.BOX_X, 3, 3),
+        "STARTS": further_starts(platform, START_COUNT),
     }
     if platform.rotary is not None:
         arms = platform.rotary
@@ -104,9 +105,9 @@ def _limits(precision: Precision) -> list[str]:
     numbers = {
         "TOLERANCE": precision.tolerance,
         "SMALL_STEP": precision.small_step,
-        "SINGULAR": platform_constants.SINGULAR,
-        "LONGEST_SHIFT": descent.LONGEST_SHIFT,
-        "LARGEST_TURN": descent.LARGEST_TURN,
+        "SINGULAR": SINGULAR,
+        "LONGEST_SHIFT": descent.LONGEST_TRANSLATION,
+        "LARGEST_TURN": descent.LARGEST_ROTATION,
         "NEGLIGIBLE": precision.negligible,
         "HOPELESS": descent.HOPELESS,
         "FLAT": descent.FLAT,
@@ -120,14 +121,14 @@ def _limits(precision: Precision) -> list[str]:
 def _loosened(c: Array, platform: Platform, precision: Precision) -> Array:
     """The constants with the workspace widened by what numbers of this kind round away."""
     loose = c.copy()
-    extra = precision.slack - platform_constants.SLACK
-    loose[layout.SHIFT_LOW : layout.SHIFT_LOW + 3] -= extra
-    loose[layout.SHIFT_HIGH : layout.SHIFT_HIGH + 3] += extra
+    extra = precision.slack - SLACK
+    loose[layout.BOX_LOW : layout.BOX_LOW + 3] -= extra
+    loose[layout.BOX_HIGH : layout.BOX_HIGH + 3] += extra
     if extra > 0 and platform.workspace is not None:
         low, high = np.radians(platform.workspace.rotation_deg.T)
         half = (high - low) / 2 + precision.slack
         cosine = np.cos(np.minimum(half, np.pi)) - precision.cosine_slack
-        loose[layout.TURN + 2 : layout.TURN + 9 : 3] = np.where(half >= np.pi, -2.0, cosine)
+        loose[layout.BOX_X + 2 : layout.BOX_X + 9 : 3] = np.where(half >= np.pi, -2.0, cosine)
     return loose
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,15 +25,15 @@ from gough.errors import GoughError
 from gough.files.formats import STANDARD, file_format, open_sink, open_source
 from gough.files.log_format import LogFormat
 from gough.files.metadata import describe
-from gough.files.placing import INVALID, PLACED, placed
 from gough.files.plausible import check_plausible
 from gough.files.report import Report
 from gough.files.rows import Block, Reading, Sink, Source
 from gough.fk.solution import solution_columns
 from gough.kinematics import leg_lengths
+from gough.limit_rules import pose_status
 from gough.platform import Platform
 from gough.pose import poses_from_columns
-from gough.status import Status
+from gough.status import InverseStatus, Status
 from gough.tables import label_column, number_column
 
 Progress = Callable[[Source, Report], None]
@@ -50,7 +49,9 @@ def solve_file(
     leg_noise: float | None = None,
     head: int = 0,
     progress: Progress | None = None,
-    **options: object,
+    certify: bool = False,
+    ambiguous: bool = False,
+    **settings: object,
 ) -> Report:
     """Solve a file of leg readings, row for row.
 
@@ -66,7 +67,8 @@ def solve_file(
         leg_noise: standard deviation of the readings, in their unit.
         head: number of first rows that the report holds.
         progress: called after every block with the file and the counts so far.
-        options: of `gough.solve`: seed, tol, max_iterations and others.
+        certify, ambiguous: as for `gough.solve`.
+        settings: of `gough.Solver`: seed, tolerance, max_iterations and others.
 
     Raises:
         GoughError: what is wrong, where, and what to do; an old file at `out` is unchanged.
@@ -76,19 +78,19 @@ def solve_file(
         >>> report.rows, report.failures
         (1000, 0)
     """
-    from gough.fk.solve import solve
+    from gough.fk.solve import Solver
 
-    solver = partial(solve, platform, leg_noise=leg_noise, **options)  # pyright: ignore[reportArgumentType]
+    solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
     report = Report(tuple(Status), head)
-    written = solution_names(angles, leg_noise is not None, bool(options.get("certify")))
+    written = solution_names(angles, leg_noise is not None, certify)
     with _open_job(legs, out, platform, reading, file_leg_columns, written) as job:
         for block in job.blocks:
             readings = block.numbers(LEGS)
             if report.rows == 0:
                 check_plausible(job.source.where, platform, readings, reading.log)
-                solver(platform.home_legs)  # compiles
+                solver.compile(len(block), certify=certify)
                 report.start()
-            solution = solver(readings)
+            solution = solver(readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
             report.add(solution.pose, readings, solution.status, solution.residual)
             invalid = solution.status == Status.INVALID_INPUT
             report.describe_invalid(block, invalid, lambda i, legs=readings: _leg_fault(legs[i]))
@@ -119,8 +121,8 @@ def inverse_file(
     Raises:
         GoughError: what is wrong, where, and what to do; an old file at `out` is unchanged.
     """
-    report = Report(PLACED, head)
-    labels = [outcome.label for outcome in PLACED]
+    report = Report(tuple(InverseStatus), head)
+    labels = [outcome.label for outcome in InverseStatus]
     # Parquet states its platform; text is written as logs of this machine are
     text = out is not None and file_format(out) == ".csv"
     form = reading.log if text else LogFormat()
@@ -131,9 +133,9 @@ def inverse_file(
             pose, fault = poses_from_columns(block.numbers(job.numbers), job.numbers)
             with np.errstate(invalid="ignore"):
                 legs = leg_lengths(platform, pose)
-            status = placed(platform, pose, legs)
+            status = pose_status(platform, pose, legs)
             report.add(pose, legs, status)
-            report.describe_invalid(block, status == INVALID, fault)
+            report.describe_invalid(block, status == InverseStatus.INVALID_INPUT, fault)
             values = ((legs - offset) / factor).T if text else legs.T
             columns = dict(zip(form.names, map(number_column, values), strict=True))
             job.write(block, columns | {STATUS: label_column(status, labels)})

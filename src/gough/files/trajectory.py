@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from gough.checks import Array
 from gough.columns import LEGS, STATUS, checked, pose_or_leg_columns
 from gough.files.formats import open_source
-from gough.files.placing import PLACED, placed
 from gough.files.plausible import check_plausible
 from gough.files.rows import Block, Reading, Source
 from gough.kinematics import leg_lengths
+from gough.limit_rules import pose_status
 from gough.platform import Platform
 from gough.pose import Pose, poses_from_columns
-from gough.status import Outcome, Status
+from gough.status import InverseStatus, Outcome, Status
 
 UNUSABLE = {status.label: status for status in Status if not status.usable}
 
@@ -118,8 +118,8 @@ class TrajectoryFile:
             legs = leg_lengths(self.platform, pose)
         stated = rows[:, 2].astype(np.int64)
         outcomes = [
-            PLACED[code] if one < 0 else Status(one)
-            for code, one in zip(placed(self.platform, pose, legs), stated.tolist(), strict=True)
+            InverseStatus(code) if one < 0 else Status(one)
+            for code, one in zip(pose_status(self.platform, pose, legs), stated.tolist(), strict=True)
         ]
         usable = np.all(np.isfinite(legs), axis=-1) & (stated < 0)
         none = np.zeros(len(rows))

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array
-from gough.fk import bulk
+from gough.errors import GoughError
 from gough.fk.solution import Solution
-from gough.kernel import constants as geometry
+from gough.kernel.constants import SINGULAR, kernel_constants
+from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
+from gough.kernel.rows import STEPS, solve_rows
 from gough.kernel.threads import in_parts
 from gough.kinematics import pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.seeds.base import PolynomialSeed, PoseSeed, Seed, find_seed
-from gough.seeds.polynomial import Polynomial
+from gough.seeds.base import PoseSeed, Seed, find_seed, further_starts, starting_poses
 from gough.status import USABLE, Status
 from gough.tables import Table, TableInfo, as_readings, table_info
+
+FEW = 1_024  # rows that the row solver takes without the block solver, which compiles longer
+LIMITS = {"tolerance": 1.0, "max_iterations": 10_000, "restarts": 10_000, "singular": 1.0}
 
 
 def solve(
@@ -24,141 +31,236 @@ def solve(
     legs: ArrayLike | Table,
     *,
     seed: str | Seed | Pose = "auto",
-    tol: float = 1e-12,
+    tolerance: float = 1e-12,
     max_iterations: int = 60,
     restarts: int = 24,
-    singular: float = geometry.SINGULAR,
+    singular: float = SINGULAR,
+    workers: int | None = None,
     leg_noise: ArrayLike | None = None,
     certify: bool = False,
     ambiguous: bool = False,
-    workers: int | None = None,
 ) -> Solution:
-    """Poses that have the given leg readings, each with what is known about it.
+    """Poses that have the given leg readings, each with a status.
 
-    Plain Newton runs on all rows at once; rows that do not settle, or settle outside the
-    workspace, are then tried one by one with a damped method and from other starts.
+    Calls a `gough.Solver` made with these settings; see there for `seed` to `workers`, and
+    `Solver.__call__` for the rest and what is raised.
 
-    Args:
-        legs: readings (..., 6): lengths, length changes [platform unit] or motor angles [rad];
-            or a pandas, polars, pyarrow or other Arrow table with columns leg_1 to leg_6. Rows
-            that hold NaN, nothing or impossible numbers get status INVALID_INPUT.
+    Example:
+        >>> platform = gough.Platform.load("reference")
+        >>> gough.solve(platform, platform.home_legs).status
+        <Status.CONVERGED: 0>
+    """
+    solver = Solver(platform, seed, tolerance, max_iterations, restarts, singular, workers)
+    return solver(legs, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Forward kinematics of one platform with fixed settings.
+
+    Make it once and call it on as many batches as needed: names of seeds are read, and networks
+    opened, when it is made.
+
+    Attributes:
         seed: the first guess. "auto" (polynomial where the platform states a workspace, else
             home), "home", "polynomial", "polynomial-5" (another degree), "disgnet" or another
             network that comes with the package, the path of a trained one or of its run's
             folder, a `Pose` (one, or one a row), or any object with `guess(legs) -> Pose`.
-        tol: largest strut length error of a converged row, as a share of the platform's size
+            Held as such an object.
+        tolerance: largest strut error of a converged row, as a share of the platform's size
             (rounding alone leaves about 2e-15).
         max_iterations: Newton steps from each start; 0 returns the guess itself.
-        restarts: other starts to try before a row is given up; unless 0, the best of them is
-            followed for longer in the end, to tell a miss from a slow approach.
+        restarts: further starts to try before a row counts as unsolved; unless 0, the best of
+            them is followed for longer in the end, to tell a miss from a slow approach.
         singular: distance to singularity (see `singularity_distance`) below which a row is
             reported as near one.
-        leg_noise: standard deviation of the readings, a number or (6,), or their covariance
-            (6, 6): asks for `Solution.covariance`.
-        certify: prove each usable pose: where it succeeds, CONVERGED becomes CERTIFIED and
-            `Solution.radius` says how far around no other pose has these legs.
-        ambiguous: look for every other pose with the same readings (see `assembly_modes`; it
-            takes hundreds of times as long) and call a usable row AMBIGUOUS where one of them
-            could be the machine's too: in workspace and stroke, with home's sign of det J.
-        workers: threads; all cores unless given.
-
-    Returns:
-        Solution: batch axes as those of `legs`; (N,) for a table.
+        workers: threads; as many as there are cores unless given.
 
     Raises:
-        GoughError: legs of another shape, an option out of range, an unknown seed.
-        InputError: a table without these columns, or with something else than numbers there.
+        GoughError: an option out of range, an unknown seed.
         PlatformError: a polynomial seed for a platform without workspace.
+
+    Example:
+        >>> solver = gough.Solver(gough.Platform.load("reference"), tolerance=1e-10)
+        >>> solver(solver.platform.home_legs).usable
+        np.True_
     """
-    readings = as_readings(legs)
-    settings = bulk.Settings(tol, max_iterations, restarts, singular, workers)
-    flat = np.ascontiguousarray(readings.reshape(-1, 6))
-    found = find_seed(platform, seed)
-    start = _start(platform, found, flat)
-    rows, troubled = bulk.newton(platform, flat, start, settings)
-    if troubled:
-        # a given pose says which assembly mode is meant: where Newton went from it stands
-        _finish(platform, flat, rows, start, isinstance(found, PoseSeed), settings)
-        _blank_invalid(rows)
-    radius = _certify(platform, flat, rows, settings) if certify else None
-    if ambiguous:
-        _doubt(platform, flat, rows)
-    return _solution(platform, rows, radius, readings.shape[:-1], leg_noise, table_info(legs))
+
+    platform: Platform
+    seed: Seed = "auto"  # pyright: ignore[reportAssignmentType] - a name, until it is read
+    tolerance: float = 1e-12
+    max_iterations: int = 60
+    restarts: int = 24
+    singular: float = SINGULAR
+    workers: int | None = None
+
+    if TYPE_CHECKING:  # what may be passed is wider than what is held
+
+        def __init__(
+            self,
+            platform: Platform,
+            seed: str | Seed | Pose = "auto",
+            tolerance: float = 1e-12,
+            max_iterations: int = 60,
+            restarts: int = 24,
+            singular: float = SINGULAR,
+            workers: int | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        for name, high in LIMITS.items():
+            value = getattr(self, name)
+            if not 0 <= value <= high:
+                raise GoughError(f"{name}: expected 0 to {high:g}, found {value!r}")
+        object.__setattr__(self, "seed", find_seed(self.platform, self.seed))
+
+    def __call__(
+        self,
+        legs: ArrayLike | Table,
+        *,
+        leg_noise: ArrayLike | None = None,
+        certify: bool = False,
+        ambiguous: bool = False,
+    ) -> Solution:
+        """Solve every row of readings.
+
+        Large batches go through plain Newton in blocks; rows that do not settle there, or settle
+        outside the workspace, and all rows of small batches are solved one by one, with a damped
+        method and from further starts where Newton fails.
+
+        Args:
+            legs: readings (..., 6): lengths, length changes [platform unit] or motor angles
+                [rad]; or a pandas, polars, pyarrow or other Arrow table with columns leg_1 to
+                leg_6. Rows that hold NaN, nothing or impossible numbers get INVALID_INPUT.
+            leg_noise: standard deviation of the readings, a number or (6,), or their covariance
+                (6, 6): fills `Solution.covariance`.
+            certify: prove each usable pose: where that succeeds, CONVERGED becomes CERTIFIED and
+                `Solution.radius` is the distance within which no other pose has these legs.
+            ambiguous: look for every other pose with the same readings (see `assembly_modes`; it
+                takes hundreds of times as long) and call a usable row AMBIGUOUS where one of
+                them could be the machine's too: in workspace and stroke, with home's sign of
+                det J.
+
+        Returns:
+            Solution: batch axes as those of `legs`; (N,) for a table.
+
+        Raises:
+            GoughError: legs of another shape, a seed that gives another number of poses.
+            InputError: a table without these columns, or with something else than numbers there.
+        """
+        readings = as_readings(legs)
+        # a copy if need be: compiled code is made for writeable, contiguous arrays only
+        flat = np.require(readings.reshape(-1, 6), requirements=["C", "W"])
+        rows = Rows.empty(len(flat))
+        start = starting_poses(self.platform, self.seed, flat)
+        if len(flat) > FEW:
+            self._solve_blocks(flat, start, rows)
+        self._solve_open_rows(flat, start, rows)
+        radius = self._certify(flat, rows) if certify else None
+        if ambiguous:
+            self._mark_ambiguous(flat, rows)
+        batch = readings.shape[:-1]
+        return _solution(self.platform, rows, radius, batch, leg_noise, table_info(legs))
+
+    def compile(self, count: int = 1, *, certify: bool = False) -> None:
+        """Compile, or load from disk, all that a batch of `count` rows needs.
+
+        The first call does so by itself; this separates the time it takes from that of solving.
+        """
+        legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
+        replace(self, seed="home")(legs, certify=certify)
+
+    def _solve_blocks(self, legs: Array, start, rows: Rows) -> None:
+        """Plain Newton on all rows; rows that it does not settle keep the status OPEN."""
+        from gough.kernel.block import solve_blocks
+
+        constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
+        tolerance = float(self.tolerance)
+        steps = min(int(self.max_iterations), int(STEPS))
+
+        def work(first: int, last: int) -> int:
+            scratch = np.zeros(COMPONENTS * WIDTH), np.empty(6 * WIDTH), np.empty(WIDTH)
+            guess = start(slice(first, last))
+            return solve_blocks(constants, legs, guess, tolerance, steps, first, last, scratch, out)
+
+        in_parts(work, len(legs), self.workers)
+
+    def _solve_open_rows(self, legs: Array, start, rows: Rows) -> None:
+        """Solve every row that is still open one by one; set the results of invalid rows to NaN."""
+        chosen = np.flatnonzero(rows.status == OPEN)
+        constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
+        starts = further_starts(self.platform, int(self.restarts) if self.max_iterations else 0)
+        # a given pose says which assembly mode is meant
+        stays = isinstance(self.seed, PoseSeed)
+        settings = np.array([self.tolerance, self.max_iterations, self.singular, stays])
+
+        def work(first: int, last: int) -> int:
+            part = chosen[first:last]
+            scratch = np.zeros(COMPONENTS), np.zeros(COMPONENTS), np.zeros((4, 6, 6))
+            solve_rows(constants, legs, part, start(part), starts, settings, scratch, out)
+            return 0
+
+        in_parts(work, len(chosen), self.workers, chunk=64, serial=64)
+        rows.fill_invalid_with_nan()
+
+    def _certify(self, legs: Array, rows: Rows) -> Array:
+        """Radii of uniqueness (N,) [platform unit], 0 where unproven; promote converged rows."""
+        from gough.certificate import certify
+
+        radius = np.zeros(len(legs))
+
+        def work(first: int, last: int) -> int:
+            part = slice(first, last)
+            pose = Pose.trusted(rows.position[part], rows.wxyz[part])
+            radius[part] = certify(self.platform, legs[part], pose).radius
+            return 0
+
+        in_parts(work, len(legs), self.workers)
+        rows.status[(radius > 0) & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
+        return radius
+
+    def _mark_ambiguous(self, legs: Array, rows: Rows) -> None:
+        """Set usable rows to AMBIGUOUS whose readings another pose of the machine could have."""
+        from gough.modes.choose import ambiguous
+
+        usable = np.flatnonzero(np.isin(rows.status, USABLE))
+        if len(usable):
+            rows.status[usable[ambiguous(self.platform, legs[usable])]] = Status.AMBIGUOUS
 
 
-def _start(platform: Platform, seed: Seed, legs: Array) -> Array | Polynomial:
-    """What the block solver starts from: a polynomial it evaluates, or internal poses (N, 7)."""
-    if isinstance(seed, PolynomialSeed):
-        return seed.polynomial
-    internal = geometry.to_internal(geometry.constants(platform), seed.guess(legs))
-    bad = ~np.all(np.isfinite(internal), axis=-1)
-    internal[bad] = bulk.other_starts(platform, 1)[0]
-    return np.ascontiguousarray(internal)
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Arrays that the compiled code writes its results to, one entry a row."""
 
+    position: Array  # (N, 3) [platform unit]
+    wxyz: Array  # (N, 4)
+    residual: Array  # (N,) [platform unit]
+    iterations: NDArray[np.int32]  # (N,)
+    status: NDArray[np.uint8]  # (N,) of Status, or OPEN
 
-def _finish(
-    platform: Platform,
-    legs: Array,
-    rows: bulk.Rows,
-    start: Array | Polynomial,
-    stay: bool,
-    settings: bulk.Settings,
-) -> None:
-    """Give every row that is still open a status, solving it again where need be.
+    @classmethod
+    def empty(cls, count: int) -> Rows:
+        """Return arrays for `count` rows, all of them open."""
+        return cls(
+            np.empty((count, 3)), np.empty((count, 4)), np.empty(count),
+            np.empty(count, np.int32), np.full(count, OPEN, np.uint8),
+        )  # fmt: skip
 
-    Args:
-        stay: leave rows that converged where they are, even outside the workspace.
-    """
-    chosen = bulk.open_rows(rows)
-    constants = geometry.constants(platform)
-    unsettled = bulk.is_unsettled(rows.status[chosen])
-    guess = np.empty((len(chosen), 7))
-    settled = chosen[~unsettled]
-    at = Pose.trusted(rows.position[settled], rows.wxyz[settled])
-    guess[~unsettled] = geometry.to_internal(constants, at)
-    again = chosen[unsettled]
-    if isinstance(start, Polynomial):
-        pose = bulk.evaluate(platform, start, legs[again])
-        guess[unsettled] = geometry.to_internal(constants, pose)
-    else:
-        guess[unsettled] = start[again]
-    starts = bulk.other_starts(platform, settings.restarts if settings.max_iterations else 0)
-    none = bulk.other_starts(platform, 0)
-    alone = ~unsettled & stay
-    for part, others in ((alone, none), (~alone, starts)):
-        bulk.rescue(platform, legs, rows, chosen[part], guess[part], others, settings)
+    def arrays(self) -> tuple:
+        """Arguments of the compiled code."""
+        return self.position, self.wxyz, self.residual, self.iterations, self.status
 
-
-def _certify(platform: Platform, legs: Array, rows: bulk.Rows, settings: bulk.Settings) -> Array:
-    """Radii of uniqueness (N,) [platform unit], 0 where unproven; promotes converged rows."""
-    from gough.certificate import certify
-
-    radius = np.zeros(len(legs))
-
-    def work(first: int, last: int) -> int:
-        part = slice(first, last)
-        pose = Pose.trusted(rows.position[part], rows.wxyz[part])
-        radius[part] = certify(platform, legs[part], pose).radius
-        return 0
-
-    in_parts(work, len(legs), settings.workers)
-    proven = radius > 0
-    rows.status[proven & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
-    return radius
-
-
-def _doubt(platform: Platform, legs: Array, rows: bulk.Rows) -> None:
-    """Call usable rows ambiguous whose readings more than one pose could have."""
-    from gough.modes.choose import ambiguous
-
-    usable = np.flatnonzero(np.isin(rows.status, USABLE))
-    if len(usable):
-        rows.status[usable[ambiguous(platform, legs[usable])]] = Status.AMBIGUOUS
+    def fill_invalid_with_nan(self) -> None:
+        """Set all results of invalid rows to NaN."""
+        invalid = self.status == Status.INVALID_INPUT
+        for array in (self.position, self.wxyz, self.residual):
+            array[invalid] = np.nan
+        self.iterations[invalid] = 0
 
 
 def _solution(
     platform: Platform,
-    rows: bulk.Rows,
+    rows: Rows,
     radius: Array | None,
     batch: tuple[int, ...],
     leg_noise: ArrayLike | None,
@@ -175,11 +277,3 @@ def _solution(
         platform.unit,
         source,
     )
-
-
-def _blank_invalid(rows: bulk.Rows) -> None:
-    """Rows without a question get no answer: NaN throughout."""
-    invalid = rows.status == Status.INVALID_INPUT
-    for array in (rows.position, rows.wxyz, rows.residual):
-        array[invalid] = np.nan
-    rows.iterations[invalid] = 0

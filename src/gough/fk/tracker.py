@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gough.errors import GoughError
-from gough.fk.bulk import Settings
-from gough.fk.solve import solve
-from gough.kernel import constants as geometry
+from gough.fk.solve import Solver
 from gough.kernel import layout
+from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
 from gough.kernel.cycle import BAD_READING, CROSSED, FAILED, STATE, cycle
 from gough.kinematics import assembly_sign
 from gough.platform import Platform
@@ -20,14 +19,14 @@ from gough.status import Event, Status
 from gough.tables import Table, as_readings, is_arrow
 from gough.text import page, pose_heads
 
-PLAIN = (np.ndarray, list, tuple)  # readings without names, told apart quickly
+PLAIN = (np.ndarray, list, tuple)  # readings without names, recognised quickly
 
 
 class Tracker:
     """Follows a platform from reading to reading.
 
     Each cycle starts Newton's method at the last pose. A pose too far from it, or beyond a
-    singularity, is not believed at once: the last good pose is held and the event says so. If
+    singularity, is not taken at once: the last good pose is held and the event says so. If
     `confirm` readings in a row lead to the same new place, it is taken, so that nothing can
     keep the tracker from following good readings again.
 
@@ -38,6 +37,12 @@ class Tracker:
             (so that a cycle allocates nothing); `pose.copy()` keeps one.
         status: `Status` of the last reading.
         event: `Event` of the last cycle.
+
+    Example:
+        >>> platform = gough.Platform.load("reference")
+        >>> tracker = gough.Tracker(platform, start=platform.home)
+        >>> tracker.update(platform.home_legs + 0.5).position.round(4)
+        array([  0.    ,   0.    , 600.5454])
     """
 
     def __init__(
@@ -48,32 +53,32 @@ class Tracker:
         max_shift: float | None = None,
         max_turn: float = 0.1,
         confirm: int = 3,
-        tol: float = 1e-12,
-        singular: float = geometry.SINGULAR,
+        tolerance: float = 1e-12,
+        singular: float = SINGULAR,
     ) -> None:
-        """Compiles what it needs, so that the first `update` is as quick as the others.
+        """Compile or load what a cycle needs, so that the first `update` is as quick as others.
 
         Args:
-            start: where the platform is; found from the first reading unless given.
-            max_shift: how far it can move in one cycle [platform unit]; 2 % of its size unless
-                given.
-            max_turn: how far it can turn in one cycle [rad].
+            start: the platform's pose; found from the first reading unless given.
+            max_shift: largest translation of the pose's position (the pivot, where the platform
+                has one) in one cycle [platform unit]; 2 % of the platform's size unless given.
+            max_turn: largest rotation in one cycle [rad].
             confirm: how many readings must agree on a place too far away before it is taken.
-            tol, singular: as for `solve`.
+            tolerance, singular: as for `gough.solve`.
 
         Raises:
             GoughError: a limit that is not above zero.
         """
         self.platform = platform
-        settings = Settings(tol=tol, singular=singular)
-        self._shift = 0.02 * platform.size if max_shift is None else max_shift
-        self._turn, self._confirm = max_turn, confirm
-        limits = {"max_shift": self._shift, "max_turn": max_turn, "confirm": confirm}
+        self._solver = Solver(platform, tolerance=tolerance, singular=singular, workers=1)
+        self._max_shift = 0.02 * platform.size if max_shift is None else max_shift
+        self._max_turn, self._confirm = max_turn, confirm
+        limits = {"max_shift": self._max_shift, "max_turn": max_turn, "confirm": confirm}
         for name, value in limits.items():
             if not value > 0:
                 raise GoughError(f"{name}: expected a number above 0, found {value!r}")
-        self._constants = geometry.constants(platform, singular)
-        self._limits = np.array([settings.tol, settings.singular, 0.0, 0.0])
+        self._constants = kernel_constants(platform, singular)
+        self._limits = np.array([tolerance, singular, 0.0, 0.0])
         self._legs = platform.home_legs[None].copy()
         self._state = np.zeros((1, STATE))
         self._buffer, self._work = np.zeros(layout.COMPONENTS), np.zeros((4, 6, 6))
@@ -82,19 +87,19 @@ class Tracker:
         self._candidate: Pose | None = None
         self.pose = Pose.trusted(self._position[0], self._wxyz[0])
         self._code, self.event = int(Status.CONVERGED), Event.FOUND
-        self._take(platform.home)
-        self._run()  # these two compile what a cycle may need, if it is not yet on disk
-        solve(platform, platform.home_legs)
+        self._set_pose(platform.home)
+        self._run_cycle()  # these two compile what a cycle may need, if it is not yet on disk
+        self._solver(platform.home_legs)
         self._lost = start is None
-        self._take(platform.home if start is None else start)
+        self._set_pose(platform.home if start is None else start)
 
     @property
     def status(self) -> Status:
-        """What is known about the last reading."""
+        """Status of the last reading."""
         return Status(self._code)
 
     def update(self, legs: ArrayLike | Table) -> Pose:
-        """The pose at the next reading (6,); `status` and `event` tell how far to trust it.
+        """Return the pose at the next reading (6,); `status` and `event` say how good it is.
 
         A row of a pandas table is a reading, too: it is read by its labels, leg_1 to leg_6.
 
@@ -109,18 +114,18 @@ class Tracker:
             self._legs[0] = legs
         except (TypeError, ValueError) as error:
             raise GoughError(f"legs: expected six numbers, found {reprlib.repr(legs)}") from error
-        code = FAILED if self._lost else self._run()
+        code = FAILED if self._lost else self._run_cycle()
         if code >= layout.OPEN:
-            self._doubt(code)
+            self._recover(code)
         else:
             self._code, self.event = code, Event.FOLLOWED
             if self._missed:
-                self._forget()
+                self._reset_missed()
         return self.pose
 
     def __repr__(self) -> str:
-        told = f"{self.event.name.lower()}, {self.status.label}"
-        return f"Tracker({self.platform.name!r}, {told}, {self.pose!r})"
+        state = f"{self.event.name.lower()}, {self.status.label}"
+        return f"Tracker({self.platform.name!r}, {state}, {self.pose!r})"
 
     def _repr_html_(self) -> str:
         heads = [*pose_heads((), self.platform.unit), "event", "status"]
@@ -130,43 +135,42 @@ class Tracker:
 
     # ---- a cycle that went well -------------------------------------------------------
 
-    def _run(self) -> int:
+    def _run_cycle(self) -> int:
         return cycle(
             self._constants, self._legs, self._state, self._limits, self._buffer, self._work,
             self._position, self._wxyz,
         )  # fmt: skip
 
-    def _forget(self) -> None:
-        """No reading is missing any more: one cycle's motion is the limit again."""
+    def _reset_missed(self) -> None:
+        """Forget missed cycles: one cycle's motion is the limit again."""
         self._missed, self._agreeing, self._candidate = 0, 0, None
         self._set_limits()
 
     def _set_limits(self) -> None:
+        """Allow one cycle's motion, and one more for each missed cycle."""
         cycles = 1 + self._missed
-        turn = min(self._turn * cycles, np.pi)
-        self._limits[2] = (self._shift * cycles / self.platform.size) ** 2
+        turn = min(self._max_turn * cycles, np.pi)
+        self._limits[2] = (self._max_shift * cycles) ** 2
         self._limits[3] = np.sin(turn / 2) ** 2
 
-    def _take(self, pose: Pose) -> None:
+    def _set_pose(self, pose: Pose) -> None:
         """Make a pose the present one."""
-        self._state[0, :7] = geometry.to_internal(self._constants, pose)
-        home = self._constants[layout.REFERENCE]
+        self._state[0, :7] = to_internal(self._constants, pose)
+        home = self._constants[layout.HOME_SIGN]
         self._state[0, 7] = float(assembly_sign(self.platform, pose)) * home
         self._position[0], self._wxyz[0] = pose.position, pose.wxyz
-        self._forget()
+        self._reset_missed()
 
     # ---- a cycle that did not ---------------------------------------------------------
 
-    def _doubt(self, code: int) -> None:
-        """Hold the pose, and see whether the readings agree on another place."""
+    def _recover(self, code: int) -> None:
+        """Hold the pose, and take another place once enough readings agree on it."""
         self._missed += 1
         self._set_limits()
         if code == BAD_READING:
             self._code, self.event = int(Status.INVALID_INPUT), Event.HELD
             return
-        found = solve(
-            self.platform, self._legs[0], tol=self._limits[0], singular=self._limits[1], workers=1
-        )
+        found = self._solver(self._legs[0])
         self._code = int(found.status)
         if self._code > Status.OUTSIDE_WORKSPACE:
             self.event = Event.HELD
@@ -174,14 +178,14 @@ class Tracker:
         self._agreeing = self._agreeing + 1 if self._agrees(found.pose) else 1
         self._candidate = found.pose
         if self._lost or self._agreeing >= self._confirm:
-            self._take(found.pose)
+            self._set_pose(found.pose)
             self._lost, self.event = False, Event.FOUND
             return
         self.event = Event.MODE_CHANGED if code == CROSSED else Event.JUMPED
 
     def _agrees(self, pose: Pose) -> bool:
-        """Whether a pose is within one cycle's motion of the last one not believed."""
+        """Return whether a pose is within one cycle's motion of the candidate."""
         if self._candidate is None:
             return False
-        shift, turn = self._candidate.distance(pose)
-        return bool(shift <= self._shift and turn <= self._turn)
+        translation, rotation = self._candidate.distance(pose)
+        return bool(translation <= self._max_shift and rotation <= self._max_turn)

@@ -1,18 +1,19 @@
 """The bulk solver: blocks of poses, one vector instruction for several at a time.
 
-Everything is compiled into `solve_rows`. Were its parts compiled apart, the process that
-compiles them would run other machine code for them than those that load `solve_rows` from the
-cache, and round some last digits differently.
+Everything is compiled into `solve_blocks`. Were its parts compiled apart, the process that
+compiles them would run other machine code for them than those that load `solve_blocks` from
+the cache, and round some last digits differently.
 """
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 
-from gough.kernel.equations import SMALL, assess, inline, newton_step
-from gough.kernel.jit import jit
+from gough.kernel.equations import SETTLED, assess, newton_step
+from gough.kernel.jit import inline, jit
 from gough.kernel.layout import (
-    COMPONENTS,
     COUNT,
     GAIN,
     INSIDE,
@@ -29,169 +30,130 @@ from gough.kernel.layout import (
     WIDTH,
     ZERO,
 )
-from gough.kernel.polynomial import guess_block
-from gough.kernel.pose_io import give_pose, in_stroke, place, put_pose, take_reading
-from gough.status import Status
-
-# A row's verdict is its status, or what it still needs.
-DONE = int(Status.CONVERGED)
-OUT_OF_STROKE = int(Status.OUTSIDE_STROKE)
-INVALID = int(Status.INVALID_INPUT)
-MAYBE_SINGULAR = OPEN
-MAYBE_OTHER_MODE = OPEN + 1
-UNSETTLED = OPEN + 2
+from gough.kernel.pose_io import get_pose, in_stroke, put_pose, put_reading, put_user_position
+from gough.kernel.rows import CONVERGED, INVALID_INPUT, OUTSIDE_STROKE
 
 
 @jit()
-def solve_rows(constants, legs, guess, polynomial, tolerance, sweeps, first, last, out):
-    """Rows first..last of legs (N, 6): pose, verdict, residual and count of each.
+def solve_blocks(constants, legs, guess, tolerance, steps, first, last, work, out):
+    """Solve rows first..last of legs (N, 6) by plain Newton.
 
     Args:
-        guess: internal poses (N, 7) to start from, or (0, 7) to use the polynomial.
-        polynomial: see `polynomial.Polynomial.arrays`.
+        guess: (last - first, 7) internal poses to start from.
         tolerance: largest strut error, as a share of the platform's size.
-        sweeps: limit of Newton sweeps.
+        steps: limit of Newton steps.
+        work: (COMPONENTS WIDTH,), (6 WIDTH,) and (WIDTH,) to work in.
         out: position (N, 3), wxyz (N, 4), residual (N,) [platform unit], iterations (N,),
-            verdict (N,).
+            status (N,), which is OPEN where the row needs the row solver.
 
     Returns:
-        How many of the rows are no plain success: open, or invalid.
+        How many of the rows are open or invalid.
     """
-    buffer = np.zeros(COMPONENTS * WIDTH)
-    readings = np.empty(6 * WIDTH)
-    starts = polynomial[4]
-    work = np.empty((2, np.max(starts[1:] - starts[:-1]) * WIDTH))
-    valid = np.empty(WIDTH, np.bool_)
+    buffer, readings, valid = work
     for k in range(WIDTH):  # puts the base joints, which most machines never move
-        take_reading(constants, legs, first, buffer, k, WIDTH)
+        put_reading(constants, legs, first, buffer, k, WIDTH)
     troubled = 0
     for start in range(first, last, WIDTH):
         _load(constants, legs, start, last, readings, buffer, valid)
-        if len(guess) > 0:
-            for k in range(WIDTH):
-                put_pose(buffer, k, WIDTH, guess, min(start + k, last - 1))
-        else:
-            guess_block(polynomial, readings, work, buffer)
-        _refine(constants, buffer, tolerance, sweeps)
+        for k in range(WIDTH):
+            row = start + k if start + k < last else last - 1
+            put_pose(buffer, k, WIDTH, guess, row - first)
+        _refine(constants, buffer, tolerance, steps)
         troubled += _store(constants, buffer, legs, valid, start, last, tolerance, out)
     return troubled
 
 
 @inline
 def _load(constants, legs, start, last, readings, buffer, valid):
-    """Readings of a block, leg by leg, and the struts they stand for.
+    """Store the struts of a block's readings; `valid` is 1 for rows that have them, else 0.
 
     The last block is filled up with its last row.
     """
     for k in range(WIDTH):
-        row = min(start + k, last - 1)
+        row = start + k if start + k < last else last - 1
         for leg in range(6):
             readings[leg * WIDTH + k] = legs[row, leg]
     rotary = constants[ROTARY] == 1
-    if not rotary and _load_lengths(constants, readings, buffer):
-        valid[:] = True
+    good = 0 if rotary else _load_lengths(constants, readings, buffer)
+    for k in range(WIDTH):
+        valid[k] = 1.0
+    if good == 6 * WIDTH:
         return
     for k in range(WIDTH):
-        valid[k] = not rotary and _has_lengths(buffer, k)
-        if not valid[k]:  # rows beside a bad one keep what they have, to the last bit
-            row = min(start + k, last - 1)
-            valid[k] = take_reading(constants, legs, row, buffer, k, WIDTH)
-
-
-@inline
-def _has_lengths(buffer, k):
-    good = True
-    for i in range(6):
-        length = buffer[(LENGTH + i) * WIDTH + k]
-        good &= (length > 0) & (length < np.inf)
-    return good
+        fine = not rotary
+        for i in range(6):
+            length = buffer[(LENGTH + i) * WIDTH + k]
+            fine &= (length > 0) & (length < inf)
+        if not fine:  # rows beside a bad one keep what they have, to the last bit
+            row = start + k if start + k < last else last - 1
+            valid[k] = 1.0 if put_reading(constants, legs, row, buffer, k, WIDTH) else 0.0
 
 
 @inline
 def _load_lengths(constants, readings, buffer):
-    """Lengths of all legs of a block as vector code; whether all of them are above zero."""
+    """Store the lengths of all legs of a block, as vector code; count those above zero."""
     inverse = constants[PER_SIZE]
     good = 0
     for i in range(6):
-        leg, gain, zero = int(constants[ORDER + i]), constants[GAIN + i], constants[ZERO + i]
-        reading = readings[leg * WIDTH : (leg + 1) * WIDTH]
-        for k in range(WIDTH):
-            length = (gain * reading[k] + zero) * inverse
-            buffer[(LENGTH + i) * WIDTH + k] = length
-            buffer[(SQUARE + i) * WIDTH + k] = length * length
-            good += 1 if (length > 0) & (length < np.inf) else 0
-    return good == 6 * WIDTH
+        gain, zero = constants[GAIN + i], constants[ZERO + i]
+        column = np.uint64(constants[ORDER + i]) * np.uint64(WIDTH)
+        at, square = np.uint64((LENGTH + i) * WIDTH), np.uint64((SQUARE + i) * WIDTH)
+        for k in range(np.uint64(WIDTH)):
+            length = (gain * readings[column + k] + zero) * inverse
+            buffer[at + k] = length
+            buffer[square + k] = length * length
+            good += 1 if (length > 0) & (length < inf) else 0
+    return good
 
 
 @inline
-def _refine(constants, buffer, tolerance, sweeps):
-    """Newton sweeps over the block until every pose has settled or `sweeps` are used up.
+def _refine(constants, buffer, tolerance, steps):
+    """Take Newton steps of the block until every pose has settled or `steps` are used up.
 
     A pose that settled with too large a residual (a step can be small and still lack digits
     where the system is ill-conditioned) is set going again.
     """
     for k in range(WIDTH):
         buffer[COUNT * WIDTH + k] = 0.0
-        buffer[STEP * WIDTH + k] = np.inf
-    for sweep in range(sweeps):
+        buffer[STEP * WIDTH + k] = inf
+    for step in range(steps):
         for k in range(WIDTH):
             newton_step(constants, buffer, k, WIDTH)
-        if _largest_step(buffer) <= SMALL or sweep == sweeps - 1:
+        largest = 0.0
+        for k in range(WIDTH):
+            size = buffer[STEP * WIDTH + k]
+            size = size if size == size else inf
+            largest = size if size > largest else largest
+        if largest <= SETTLED or step == steps - 1:
             for k in range(WIDTH):
                 assess(constants, buffer, k, WIDTH)
-            if _wake(buffer, tolerance) == 0:
+            above = 0
+            for k in range(WIDTH):
+                missed = not buffer[RESIDUAL * WIDTH + k] <= tolerance
+                buffer[STEP * WIDTH + k] = inf if missed else buffer[STEP * WIDTH + k]
+                above += 1 if missed else 0
+            if above == 0:
                 return
-    if sweeps == 0:
-        for k in range(WIDTH):
-            assess(constants, buffer, k, WIDTH)
-
-
-@inline
-def _largest_step(buffer):
-    """Largest squared step of the sweep, infinite for NaN."""
-    largest = 0.0
-    for k in range(WIDTH):
-        step = buffer[STEP * WIDTH + k]
-        largest = max(largest, step if step == step else np.inf)
-    return largest
-
-
-@inline
-def _wake(buffer, tolerance):
-    """Set poses going again whose residual is above the tolerance; how many there are."""
-    count = 0
-    for k in range(WIDTH):
-        above = not buffer[RESIDUAL * WIDTH + k] <= tolerance
-        buffer[STEP * WIDTH + k] = np.inf if above else buffer[STEP * WIDTH + k]
-        count += 1 if above else 0
-    return count
 
 
 @inline
 def _store(constants, buffer, legs, valid, start, last, tolerance, out):
-    position, wxyz, residuals, iterations, verdicts = out
+    """Copy a block's results to `out`; return how many rows are open or invalid."""
+    position, wxyz, residuals, iterations, statuses = out
     troubled = 0
     for k in range(WIDTH):  # all of them: a shorter loop would round its last poses differently
-        place(constants, buffer, k, WIDTH)
-    for k in range(min(WIDTH, last - start)):
+        put_user_position(constants, buffer, k, WIDTH)
+    for k in range(WIDTH if start + WIDTH < last else last - start):
         row = start + k
-        give_pose(buffer, k, WIDTH, position, wxyz, row)
+        get_pose(buffer, k, WIDTH, position, wxyz, row)
         residuals[row] = buffer[RESIDUAL * WIDTH + k] * constants[SIZE]
         iterations[row] = int(buffer[COUNT * WIDTH + k])
-        stroke = in_stroke(constants, legs, row)
-        found = verdict(buffer, k, WIDTH, tolerance, stroke) if valid[k] else INVALID
-        verdicts[row] = found
-        troubled += 1 if found >= INVALID else 0
+        status = CONVERGED if in_stroke(constants, legs, row) else OUTSIDE_STROKE
+        solved = buffer[RESIDUAL * WIDTH + k] <= tolerance
+        if not solved or buffer[INSIDE * WIDTH + k] == 0.0 or buffer[REGULAR * WIDTH + k] == 0.0:
+            status = OPEN
+        if valid[k] == 0.0:
+            status = INVALID_INPUT
+        statuses[row] = status
+        troubled += 1 if status >= INVALID_INPUT else 0
     return troubled
-
-
-@inline
-def verdict(buffer, k, stride, tolerance, stroke):
-    """What an assessed pose still needs."""
-    if not buffer[RESIDUAL * stride + k] <= tolerance:
-        return UNSETTLED
-    if buffer[INSIDE * stride + k] == 0.0:
-        return MAYBE_OTHER_MODE
-    if buffer[REGULAR * stride + k] == 0.0:
-        return MAYBE_SINGULAR
-    return DONE if stroke else OUT_OF_STROKE

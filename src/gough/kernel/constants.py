@@ -1,4 +1,4 @@
-"""A platform as the compiled code wants it: one flat array of numbers without unit."""
+"""A platform in the form that the compiled code takes: one flat array of numbers without unit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from gough import quaternion
+from gough import limit_rules, quaternion
 from gough.checks import Array
 from gough.kernel import layout
 from gough.kinematics import equivalent_struts, joint_positions, joint_radius, normalised_jacobian
@@ -14,12 +14,11 @@ from gough.platform import Platform
 from gough.pose import Pose
 
 SINGULAR = 1e-3  # distance to singularity below which a pose is called close to one
-SLACK = 1e-9  # of the platform's size, and [rad]: keeps poses on the box's faces inside
 
 
 @lru_cache(maxsize=256)
-def constants(platform: Platform, singular: float = SINGULAR) -> Array:
-    """The platform's constants, (layout.CONSTANTS,).
+def kernel_constants(platform: Platform, singular: float = SINGULAR) -> Array:
+    """Return the platform's constants, (layout.CONSTANTS,).
 
     Args:
         singular: distance to singularity below which poses are to be looked at closely.
@@ -42,56 +41,49 @@ def constants(platform: Platform, singular: float = SINGULAR) -> Array:
     put(layout.PER_SIZE, 1 / size)
     put(layout.PIVOT, (platform.pivot_point - centre) / size)
     put(layout.ORIGIN, base_centre - platform.pivot_point)
-    put(layout.REST, platform.home_legs)
-    put(layout.GAIN, platform.gain[order])
-    put(layout.ZERO, platform.true_at_zero[order])
-    stroke = platform.stroke if platform.stroke is not None else np.tile([-np.inf, np.inf], (6, 1))
-    put(layout.STROKE, stroke)
+    put(layout.HOME_READINGS, platform.home_legs)
+    put(layout.STROKE, limit_rules.stroke_limits(platform))
     if platform.rotary is not None:
         arms = platform.rotary
-        c[layout.ROTARY] = 1.0
+        put(layout.ROTARY, 1.0)
         put(layout.ROD, arms.rod_length[order] / size)
         put(layout.ARM_X, (arms.arm_length[:, None] / size * arms.axis_x)[order])
         put(layout.ARM_Y, (arms.arm_length[:, None] / size * arms.axis_y)[order])
+    put(layout.GAIN, platform.gain[order])
+    put(layout.ZERO, platform.true_at_zero[order])
+    put(layout.HOME_POSITION, (platform.home.position - c[layout.ORIGIN :][:3]) / size)
+    put(layout.HOME_QUATERNION, platform.home.wxyz)
     _put_workspace(put, platform)
-    put(layout.START, to_internal(c, platform.home))
+    put(layout.HOME_POSE, to_internal(c, platform.home))
     # sigma_min >= |det| ((n - 1) / |J|_F^2)^((n - 1) / 2) with n = 6 (Yu and Gu 1997), and
     # |J|_F^2 <= 12: six unit vectors, and moments whose squares sum to at most six.
-    put(layout.ENOUGH, singular / (5 / 12) ** 2.5)
-    put(
-        layout.REFERENCE,
-        np.sign(np.linalg.det(normalised_jacobian(platform, platform.home)[order])),
-    )
+    put(layout.REGULAR_DETERMINANT, singular / (5 / 12) ** 2.5)
+    at_home = normalised_jacobian(platform, platform.home)[order]
+    put(layout.HOME_SIGN, np.sign(np.linalg.det(at_home)))
     c.flags.writeable = False
     return c
 
 
 def _put_workspace(put, platform: Platform) -> None:
-    home = platform.home
-    put(layout.CENTRE, (home.position - _origin(platform)) / platform.size)
-    put(layout.HOME, home.wxyz)
+    """Store the box of the workspace, widened by the slack of `limit_rules`."""
+    slack = limit_rules.SLACK
     if platform.workspace is None:
-        put(layout.SHIFT_LOW, np.full(3, -np.inf))
-        put(layout.SHIFT_HIGH, np.full(3, np.inf))
-        put(layout.TURN, np.tile([1.0, 0.0, -2.0], (3, 1)))
+        put(layout.BOX_LOW, np.full(3, -np.inf))
+        put(layout.BOX_HIGH, np.full(3, np.inf))
+        put(layout.BOX_X, np.tile([1.0, 0.0, -2.0], (3, 1)))
         return
     low, high = platform.workspace.translation.T / platform.size
-    put(layout.SHIFT_LOW, low - SLACK)
-    put(layout.SHIFT_HIGH, high + SLACK)
+    put(layout.BOX_LOW, low - slack)
+    put(layout.BOX_HIGH, high + slack)
     low, high = np.radians(platform.workspace.rotation_deg.T)
-    middle, half = (low + high) / 2, (high - low) / 2
+    middle, half = (low + high) / 2, (high - low) / 2 + slack
     # a cosine cannot tell angles below 1e-8 apart; -2 admits every angle
-    limit = np.where(half + SLACK >= np.pi, -2.0, np.cos(np.minimum(half + SLACK, np.pi)) - 4e-16)
-    put(layout.TURN, np.stack([np.cos(middle), np.sin(middle), limit], axis=-1))
-
-
-def _origin(platform: Platform) -> Array:
-    """Centre of the base joints minus pivot: position 0 of the internal frame, (3,)."""
-    return platform.base.mean(axis=0) - platform.pivot_point
+    limit = np.where(half >= np.pi, -2.0, np.cos(np.minimum(half, np.pi)) - 4e-16)
+    put(layout.BOX_X, np.stack([np.cos(middle), np.sin(middle), limit], axis=-1))
 
 
 def solving_order(platform: Platform) -> np.ndarray:
-    """The order of legs in which elimination at home needs no pivoting, (6,) of int.
+    """Return the order (6,) of legs in which elimination at home needs no pivoting.
 
     Partial pivoting at home picks it; over a workspace on home's side of the singularities
     the pivots stay away from zero, or the row is caught by its residual.
@@ -115,3 +107,11 @@ def to_internal(c: Array, pose: Pose) -> Array:
     lever = quaternion.to_matrix(pose.wxyz) @ c[layout.PIVOT : layout.PIVOT + 3]
     position = (pose.position - c[layout.ORIGIN : layout.ORIGIN + 3]) / c[layout.SIZE] - lever
     return np.concatenate([position, pose.wxyz], axis=-1)
+
+
+def from_internal(c: Array, internal: Array) -> Pose:
+    """Poses (...) of internal positions and unit quaternions (..., 7); inverts `to_internal`."""
+    wxyz = internal[..., 3:]
+    lever = quaternion.to_matrix(wxyz) @ c[layout.PIVOT : layout.PIVOT + 3]
+    position = c[layout.SIZE] * (internal[..., :3] + lever) + c[layout.ORIGIN : layout.ORIGIN + 3]
+    return Pose.trusted(position, wxyz)

@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from gough.kernel.block import MAYBE_OTHER_MODE, MAYBE_SINGULAR, UNSETTLED, verdict
-from gough.kernel.descent import strut_errors
-from gough.kernel.equations import SMALL, assess, newton_step
+from gough.kernel.equations import newton
 from gough.kernel.jit import jit
-from gough.kernel.layout import DETERMINANT, OPEN, QUATERNION, STEP
-from gough.kernel.linear import smallest_singular_value
-from gough.kernel.pose_io import give_pose, in_stroke, place, put_pose, take_reading
-from gough.status import Status
+from gough.kernel.layout import DETERMINANT, FIRST, OPEN, QUATERNION, SINGLE, USER_POSITION
+from gough.kernel.pose_io import get_pose, put_pose, put_reading, put_user_position
+from gough.kernel.rows import status_of_pose
 
-# What a cycle may say besides a status: the pose is as it was before.
-FAILED = OPEN
-JUMPED = OPEN + 1
-CROSSED = OPEN + 2
-BAD_READING = OPEN + 3
+# What a cycle may return besides a status: the pose is as it was before.
+FAILED = OPEN  # Newton's method did not settle
+TOO_FAR = OPEN + 1  # the pose is too far from the last
+CROSSED = OPEN + 2  # a singularity lies between the pose and the last
+BAD_READING = OPEN + 3  # not finite, or not above zero
 
-STEPS = 12  # a warm start needs one to three
+STEPS = np.int64(12)  # a warm start needs one to three
 STATE = 8  # internal pose 7, sign of the determinant 1
-
-CONVERGED, OUTSIDE_STROKE = int(Status.CONVERGED), int(Status.OUTSIDE_STROKE)
-NEAR_SINGULARITY, OUTSIDE_WORKSPACE = int(Status.NEAR_SINGULARITY), int(Status.OUTSIDE_WORKSPACE)
 
 
 @jit()
@@ -32,57 +26,31 @@ def cycle(constants, legs, state, limits, buffer, work, position, wxyz):
 
     Args:
         limits: tolerance, distance to singularity called near, and how far a pose may be from
-            the last: squared shift [share of the size], squared sine of half the turn.
+            the last: squared translation [platform unit^2], squared sine of half the rotation.
         buffer, work: (COMPONENTS,) and (4, 6, 6) to work in.
         position, wxyz: (1, 3) and (1, 4), the pose as the user sees it.
 
     Returns:
         A status, with the new pose in state, position and wxyz; or one of the codes above.
     """
-    if not take_reading(constants, legs, 0, buffer, 0, 1):
+    if not put_reading(constants, legs, FIRST, buffer, FIRST, SINGLE):
         return BAD_READING
-    put_pose(buffer, 0, 1, state, 0)
-    buffer[STEP] = np.inf
-    for _ in range(STEPS):
-        newton_step(constants, buffer, 0, 1)
-        if not buffer[STEP] > SMALL:
-            break
-    assess(constants, buffer, 0, 1)
-    found = verdict(buffer, 0, 1, limits[0], in_stroke(constants, legs, 0))
-    if found == UNSETTLED:
+    put_pose(buffer, FIRST, SINGLE, state, FIRST)
+    if not newton(constants, buffer, limits[0], STEPS):
         return FAILED
     if buffer[DETERMINANT] * state[0, 7] < 0:
         return CROSSED
-    if moved_too_far(buffer, state, limits[2], limits[3]):
-        return JUMPED
-    keep(constants, buffer, state, position, wxyz)
-    if found == MAYBE_OTHER_MODE:
-        return OUTSIDE_WORKSPACE
-    if found == MAYBE_SINGULAR:
-        strut_errors(constants, buffer, work[0], work[3, 0])
-        near = smallest_singular_value(work[0], work[1]) < limits[1]
-        stroke = in_stroke(constants, legs, 0)
-        return NEAR_SINGULARITY if near else (CONVERGED if stroke else OUTSIDE_STROKE)
-    return found
-
-
-@jit()
-def moved_too_far(buffer, state, shift, turn):
-    """Whether the pose in `buffer` is too far from that in `state`; limits as in `cycle`."""
-    q = QUATERNION
+    put_user_position(constants, buffer, FIRST, SINGLE)
     moved, along = 0.0, 0.0
     for i in range(3):
-        moved += (buffer[i] - state[0, i]) ** 2
+        step = buffer[USER_POSITION + i] - position[0, i]
+        moved += step * step
     for i in range(4):
-        along += buffer[q + i] * state[0, q + i]
-    return moved > shift or 1 - along * along > turn
-
-
-@jit()
-def keep(constants, buffer, state, position, wxyz):
-    """Take the pose in `buffer` for the present one."""
+        along += buffer[QUATERNION + i] * wxyz[0, i]
+    if moved > limits[2] or 1 - along * along > limits[3]:
+        return TOO_FAR
     for i in range(7):
         state[0, i] = buffer[i]
     state[0, 7] = 1.0 if buffer[DETERMINANT] > 0 else -1.0
-    place(constants, buffer, 0, 1)
-    give_pose(buffer, 0, 1, position, wxyz, 0)
+    get_pose(buffer, FIRST, SINGLE, position, wxyz, FIRST)
+    return status_of_pose(constants, buffer, legs, FIRST, limits[1], work)

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import numba
 
+from gough import status
+
 Function = TypeVar("Function", bound=Callable)
 
 # Reordering and fused multiply-add are allowed; assuming that NaN and infinity do not occur
@@ -39,35 +41,50 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
                 raise
             return numba.njit(**settings, **options)(function)  # pyright: ignore
         if cache:
-            _depend_on_whole_package(compiled, Path(inspect.getfile(function)).parent)
+            _expire_with_sources(compiled, Path(inspect.getfile(function)).parent)
         return compiled  # pyright: ignore[reportReturnType]
 
     return decorate
 
 
-def _depend_on_whole_package(compiled, folder: Path) -> None:
-    """Let cached code expire when any source beside it, or in this package, changes.
-
-    Numba itself looks at the function's own file only; a change in a function that was
-    compiled into it (`equations.py`, say) would go unnoticed and old code would run on.
-    """
-    file = compiled._cache._cache_file
-    file._source_stamp = (file._source_stamp, _digest(folder), _digest(Path(__file__).parent))
-
-
-@lru_cache
-def _digest(folder: Path) -> str:
-    digest = hashlib.sha256()
-    for path in sorted(folder.glob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def inner(function: Function | None = None, *, fast: bool = True) -> Any:
+def inner(function: Function | None = None, *, fast: bool = True, inline: bool = False) -> Any:
     """Compile a function that only compiled code calls, for use as `@inner`.
 
     It gets no entry from Python and no cache file, which saves half of its compile time: it
     becomes part of its callers, and those are cached.
+
+    Args:
+        fast: as in `jit`.
+        inline: always put its instructions into the caller, as vector loops need.
     """
-    decorate = jit(fast=fast, cache=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    if inline:
+        options["forceinline"] = True
+    decorate = jit(fast=fast, cache=False, **options)
     return decorate if function is None else decorate(function)
+
+
+def inline(function: Function) -> Function:
+    """Compile a function into its compiled callers, for use as `@inline`; see `inner`."""
+    return inner(function, inline=True)
+
+
+def _expire_with_sources(compiled, folder: Path) -> None:
+    """Let cached code expire when a source that may be compiled into it changes.
+
+    Those are the sources beside the function, those of this folder and the numbers of the
+    statuses. Numba itself looks at the function's own file only; a change in a function that
+    was compiled into it (`equations.py`, say) would go unnoticed and old code would run on.
+    """
+    file = compiled._cache._cache_file
+    sources = (_digest(folder), _digest(Path(__file__).parent), _digest(Path(status.__file__)))
+    file._source_stamp = (file._source_stamp, *sources)
+
+
+@lru_cache
+def _digest(path: Path) -> str:
+    """SHA-256 of a file, or of all sources in a folder."""
+    digest = hashlib.sha256()
+    for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
+        digest.update(source.read_bytes())
+    return digest.hexdigest()

@@ -1,8 +1,10 @@
-"""Where things are in the two flat arrays that the compiled code works on.
+"""Positions of all quantities in the two flat arrays that the compiled code works on.
 
 One array each keeps the argument count down (a call from Python pays for every argument) and
 lets LLVM see that loads and stores do not overlap.
 """
+
+import numpy as np
 
 # The buffer: component c of pose k is at buffer[c * stride + k].
 POSITION = 0  # s: 3
@@ -16,22 +18,27 @@ RESIDUAL = 39  # largest | |d_i| - l_i |
 INSIDE = 40  # 1 in the workspace and on home's side of all singularities, else 0
 REGULAR = 41  # 1 where the distance to singularity is surely above the threshold, else 0
 COUNT = 42  # Newton steps taken
-PLACE = 43  # position as the user sees it [platform unit]: 3
+USER_POSITION = 43  # position as the user sees it [platform unit]: 3
 COMPONENTS = 46
 
-WIDTH = 64  # poses in a block: long enough for vector loops, short enough for the cache
+# Arguments of compiled functions are NumPy's integers: each Python literal would be a type of
+# its own to Numba, and the function compiled once for every one of them.
+LEG_1, LEG_2, LEG_3, LEG_4, LEG_5, LEG_6 = np.arange(6)
+FIRST, SINGLE = np.arange(2)  # k and stride of a buffer that holds one pose
+WIDTH = np.int64(64)  # poses in a block: enough for vector loops, few enough for the cache
+YES = np.bool_(True)
 
-# The constants of a platform, made in `geometry.py`. Lengths are divided by its size.
+# The constants of a platform, made in `constants.py`. Lengths are divided by its size.
 JOINTS = 0  # q: platform joints from their centre, legs in solving order: 6 x 3
 RADIUS = 18  # root mean square of |q_i|
-REFERENCE = 19  # sign of the determinant at home
-ENOUGH = 20  # determinant of the unit-free Jacobian above which a pose is surely regular
-CENTRE = 21  # what the workspace's positions are relative to: 3
+HOME_SIGN = 19  # sign of the determinant at home
+REGULAR_DETERMINANT = 20  # of the unit-free Jacobian: above it a pose is surely regular
+HOME_POSITION = 21  # origin of the workspace's box, in its axes: 3
 PIVOT = 24  # pivot from the centre of the platform joints: 3
-SHIFT_LOW = 27  # workspace: 3
-SHIFT_HIGH = 30  # workspace: 3
-HOME = 33  # home quaternion: 4
-TURN = 37  # cos mid, sin mid, cos half width of each Euler angle's range: 3 x 3
+BOX_LOW = 27  # workspace, widened by the slack of `limit_rules`: 3
+BOX_HIGH = 30  # workspace, widened: 3
+HOME_QUATERNION = 33  # 4
+BOX_X, BOX_Y, BOX_Z = np.array([37, 40, 43])  # of each Euler angle: cos mid, sin mid, cos half
 ORDER = 46  # which reading each leg in solving order has: 6
 FIXED = 52  # base joints from their centre (arm centres, for rotary legs): 6 x 3
 GAIN = 70  # length or angle = gain times reading + zero; see `gough.struts`: 6
@@ -42,11 +49,10 @@ ARM_X = 89  # arm length times axis_x: 6 x 3
 ARM_Y = 107  # arm length times axis_y: 6 x 3
 SIZE = 125  # of the platform [platform unit]
 ORIGIN = 126  # centre of the base joints minus pivot [platform unit]: 3
-START = 129  # home in internal coordinates: position 3, quaternion 4
-REST = 136  # readings at home, as they come: 6
-STROKE = 142  # lowest and highest reading, as they come: 6 x 2
+HOME_POSE = 129  # in internal coordinates: position 3, quaternion 4
+HOME_READINGS = 136  # as they come: 6
+STROKE = 142  # lowest and highest reading, as they come, widened: 6 x 2
 PER_SIZE = 154  # 1 / SIZE, made once: compilers may turn x (1 / y) into x / y in one loop only
 CONSTANTS = 155
 
-# Block verdicts from here on are not statuses: the row is still open.
-OPEN = 100
+OPEN = 100  # in place of a status: the row still needs the row solver

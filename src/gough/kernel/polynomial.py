@@ -1,51 +1,81 @@
-"""A polynomial of six readings, evaluated for a block of poses at once.
+"""A polynomial of six readings that gives poses, evaluated for blocks of rows.
 
-The inner loops run over the poses of a block with unsigned indices: with signed ones Numba
+The inner loops run over the rows of a block with unsigned indices: with signed ones Numba
 must allow for negative (wrapping) indices, and LLVM then gives up on vector code.
 """
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
-from gough.kernel.equations import inline, put_quaternion
+from gough.kernel.jit import inline, jit
 from gough.kernel.layout import WIDTH
 
 CLAMP = 1.25  # readings further out than this share of the fitted range are drawn in to it
 SPAN = np.uint64(WIDTH)
+ZERO, ONE, TWO, THREE, FOUR, FIVE = np.arange(6).astype(np.uint64)
 
 
-@inline
-def _scale(scaling, readings, u):
-    """Readings as -1..1 over the fitted range; NaN becomes 0."""
-    for leg in range(6):
-        centre, factor = scaling[0, leg], scaling[1, leg]
-        for k in range(WIDTH):
-            value = (readings[leg * WIDTH + k] - centre) * factor
-            value = min(max(value, -CLAMP), CLAMP)
-            u[leg * WIDTH + k] = value if value == value else 0.0
+@jit()
+def evaluate(polynomial, legs, work, out):
+    """Fill `out` (N, 7) with the internal poses of readings legs (N, 6).
 
-
-@inline
-def _multiply(lower, u, upper, parent, variable):
-    """Monomials of one degree (`upper`) from those of the degree below: parent times variable."""
-    for m in range(len(parent)):
-        p, v = np.uint64(parent[m]) * SPAN, np.uint64(variable[m]) * SPAN
-        o = np.uint64(m) * SPAN
+    Args:
+        polynomial: coefficients (M, 6); parent and variable (M,) of each monomial; scaling
+            (2, 6), the readings' centre and inverse half range; first monomial of each degree
+            and the end (degree + 2,); turn (5,), see `gough.seeds.polynomial.Polynomial`.
+            Parents are counted within the degree below; every degree has an even count; whole
+            numbers are unsigned.
+        work: (6 WIDTH,), (6 WIDTH,) and (2 WIDTH times the largest count of a degree,) to work in.
+    """
+    coefficients, parent, variable, scaling, degrees, turn = polynomial
+    u, total, monomials = work
+    half = np.uint64(len(monomials)) // TWO
+    for start in range(0, len(legs), WIDTH):
+        for leg in range(6):
+            for k in range(WIDTH):
+                row = start + k if start + k < len(legs) else len(legs) - 1
+                value = (legs[row, leg] - scaling[0, leg]) * scaling[1, leg]
+                value = value if value < CLAMP else CLAMP
+                value = value if value > -CLAMP else -CLAMP
+                u[leg * WIDTH + k] = value if legs[row, leg] == legs[row, leg] else 0.0
+        for o in range(6):
+            for k in range(WIDTH):
+                total[o * WIDTH + k] = coefficients[0, o]
+        lower, upper = ZERO, half
         for k in range(SPAN):
-            upper[o + k] = lower[p + k] * u[v + k]
+            monomials[lower + k] = 1.0
+        for degree in range(1, len(degrees) - 1):
+            first, last = degrees[degree], degrees[degree + 1]
+            _multiply(monomials, lower, u, upper, parent, variable, first, last)
+            _accumulate(coefficients, monomials, upper, total, first, last)
+            lower, upper = upper, lower
+        for k in range(WIDTH if start + WIDTH < len(legs) else len(legs) - start):
+            _decode(total, k, turn, out, start + k)
 
 
 @inline
-def _accumulate(coefficients, monomials, total, first, last):
+def _multiply(monomials, lower, u, upper, parent, variable, first, last):
+    """Monomials of one degree, from `upper` on: those of the degree below times a variable."""
+    for m in range(first, last):
+        p, v, o = lower + parent[m] * SPAN, variable[m] * SPAN, upper + (m - first) * SPAN
+        for k in range(SPAN):
+            monomials[o + k] = monomials[p + k] * u[v + k]
+
+
+@inline
+def _accumulate(coefficients, monomials, upper, total, first, last):
     """Add the terms of monomials first..last, two at a time, to the six outputs."""
     c = coefficients
-    o1, o2, o3, o4, o5 = SPAN, SPAN + SPAN, SPAN * 3, SPAN * 4, SPAN * 5
-    for m in range(first, last, 2):
+    o1, o2, o3, o4, o5 = SPAN, SPAN * TWO, SPAN * THREE, SPAN * FOUR, SPAN * FIVE
+    for m in range(first, last, TWO):
         a0, a1, a2, a3, a4, a5 = c[m, 0], c[m, 1], c[m, 2], c[m, 3], c[m, 4], c[m, 5]
-        n = m + 1
+        n = m + ONE
         b0, b1, b2, b3, b4, b5 = c[n, 0], c[n, 1], c[n, 2], c[n, 3], c[n, 4], c[n, 5]
-        p, q = np.uint64(m - first) * SPAN, np.uint64(n - first) * SPAN
+        p = upper + (m - first) * SPAN
+        q = p + SPAN
         for k in range(SPAN):
             x, y = monomials[p + k], monomials[q + k]
             total[k] += a0 * x + b0 * y
@@ -57,44 +87,22 @@ def _accumulate(coefficients, monomials, total, first, last):
 
 
 @inline
-def _place(total, anchor, buffer):
-    """Outputs as internal poses: position, and the quaternion (1, h) times the anchor."""
-    w, x, y, z = anchor
-    for k in range(WIDTH):
-        for axis in range(3):
-            buffer[axis * WIDTH + k] = total[axis * WIDTH + k]
-        a, b, c = total[3 * WIDTH + k], total[4 * WIDTH + k], total[5 * WIDTH + k]
-        put_quaternion(
-            buffer, k, WIDTH,
-            w - a * x - b * y - c * z,
-            x + a * w + b * z - c * y,
-            y + b * w + c * x - a * z,
-            z + c * w + a * y - b * x,
-        )  # fmt: skip
+def _decode(total, k, turn, out, row):
+    """Copy six outputs to row `row` of out (N, 7): position, then the rotation as a quaternion.
 
-
-@inline
-def guess_block(polynomial, readings, work, buffer):
-    """Internal poses of a block into the buffer.
-
-    Args:
-        polynomial: coefficients (M, 6); parent and variable (M,) of each monomial; scaling
-            (2, 6), the readings' centre and inverse half range; first monomial of each degree
-            and the end (degree + 2,); anchor (4,), the quaternion that turns are counted from.
-            Parents are counted within the degree below; every degree has an even count.
-        readings: (6 * WIDTH,), reading i of pose k at i * WIDTH + k.
-        work: monomials, (2, largest count of a degree * WIDTH).
+    With u the last three outputs, (turn[4] + sqrt(1 - u.u), u) is along the quaternion of the
+    rotation from the reference turn[:4].
     """
-    coefficients, parent, variable, scaling, starts, anchor = polynomial
-    u, total = np.empty(6 * WIDTH), np.empty(6 * WIDTH)
-    _scale(scaling, readings, u)
-    for o in range(6):
-        total[o * WIDTH : (o + 1) * WIDTH] = coefficients[0, o]
-    lower, upper = work[0], work[1]
-    lower[:WIDTH] = 1.0
-    for degree in range(1, len(starts) - 1):
-        first, last = starts[degree], starts[degree + 1]
-        _multiply(lower, u, upper, parent[first:last], variable[first:last])
-        _accumulate(coefficients, upper, total, first, last)
-        lower, upper = upper, lower
-    _place(total, anchor, buffer)
+    a, b, c = total[3 * WIDTH + k], total[4 * WIDTH + k], total[5 * WIDTH + k]
+    rest = 1 - a * a - b * b - c * c
+    s = turn[4] + sqrt(rest if rest > 0 else 0.0)
+    w, x, y, z = turn[0], turn[1], turn[2], turn[3]
+    out[row, 0], out[row, 1], out[row, 2] = total[k], total[WIDTH + k], total[2 * WIDTH + k]
+    w, x, y, z = (
+        s * w - a * x - b * y - c * z,
+        s * x + a * w + b * z - c * y,
+        s * y + b * w + c * x - a * z,
+        s * z + c * w + a * y - b * x,
+    )
+    norm = 1 / sqrt(w * w + x * x + y * y + z * z)
+    out[row, 3], out[row, 4], out[row, 5], out[row, 6] = w * norm, x * norm, y * norm, z * norm

@@ -12,6 +12,7 @@ from gough import quaternion
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.kinematics import joint_positions, leg_lengths
+from gough.limit_rules import in_stroke
 from gough.modes.assembly import assembly_modes
 from gough.modes.result import AssemblyModes
 from gough.platform import Platform
@@ -87,8 +88,7 @@ def choose_mode(
     platform, pose, row = modes.platform, modes.pose, modes.row
     passes = {"side": same_side(platform, pose), "sign": modes.sign > 0}
     if platform.stroke is not None:
-        low, high = platform.stroke.T
-        passes["stroke"] = np.all((modes.readings >= low) & (modes.readings <= high), axis=-1)
+        passes["stroke"] = in_stroke(platform, modes.readings)
     if platform.workspace is not None:
         passes["workspace"] = platform.in_workspace(pose)
     if platform.rotary is not None:

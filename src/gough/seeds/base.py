@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
+from gough.kernel import layout
+from gough.kernel.constants import kernel_constants, to_internal
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.seeds import cache, polynomial
+from gough.seeds.polynomial import DEGREE, PolynomialSeed
 from gough.seeds.taylor import TaylorSeed
-
-DEGREE = 3  # fast to evaluate, and the first degree that seldom leads to another mode
+from gough.workspace import Workspace
 
 
 class Seed(Protocol):
-    """A first guess. Networks, given poses and constants all look like this to the solver."""
+    """A first guess. Networks, given poses and polynomials all look like this to the solver."""
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name for messages."""
         ...
 
     def guess(self, legs: Array) -> Pose:
@@ -31,35 +33,17 @@ class Seed(Protocol):
         ...
 
 
-class PolynomialSeed:
-    """Poses as a polynomial of the readings, fitted for a platform and its workspace.
-
-    The solver evaluates it inside its compiled loop; `guess` gives the same poses outside.
-    Degree 0 is the platform's home pose, whatever the readings.
-    """
-
-    def __init__(self, platform: Platform, degree: int = DEGREE) -> None:
-        """Fits the polynomial, or takes it from the cache on disk.
-
-        Raises:
-            GoughError: a degree that is not 0 to 7, or a workspace that cannot be reached.
-            PlatformError: the platform states no workspace.
-        """
-        if degree not in range(8):
-            raise GoughError(f"degree: expected 0 to 7, found {degree!r}")
-        self.platform, self.degree = platform, degree
-        self.polynomial = fitted(platform, degree)
+class KernelSeed(Seed, Protocol):
+    """A seed so fast that the solver has it guess part by part, on each of its threads."""
 
     @property
-    def name(self) -> str:
-        """As `solve` takes it."""
-        return f"polynomial-{self.degree}" if self.degree else "home"
+    def platform(self) -> Platform:
+        """The machine whose internal poses `kernel_poses` gives."""
+        ...
 
-    def guess(self, legs: Array) -> Pose:
-        """Poses, batch (N,), for readings (N, 6)."""
-        from gough.fk.bulk import evaluate
-
-        return evaluate(self.platform, self.polynomial, legs)
+    def kernel_poses(self, legs: Array) -> Array:
+        """The poses of `guess` in the solver's internal form, (N, 7)."""
+        ...
 
 
 class PoseSeed:
@@ -88,19 +72,30 @@ class PoseSeed:
         )
 
 
-@lru_cache(maxsize=64)
-def fitted(platform: Platform, degree: int) -> polynomial.Polynomial:
-    """The polynomial of a platform: from memory, from disk, or fitted now and kept."""
-    if degree == 0:
-        return polynomial.constant(platform)
-    return cache.remember(platform, degree, lambda: polynomial.fit(platform, degree))
+def starting_poses(platform: Platform, seed: Seed, legs: Array) -> Callable[[Any], Array]:
+    """Return a function that gives the internal poses (K, 7) that K rows start from.
+
+    A `KernelSeed` of this platform guesses when the function is called, any other now.
+
+    Args:
+        legs: readings (N, 6). The function takes a slice or indices (K,) of its rows.
+    """
+    kernel_poses = getattr(seed, "kernel_poses", None)
+    if kernel_poses is not None and cast(KernelSeed, seed).platform == platform:
+        return lambda rows: kernel_poses(legs[rows])
+    constants = kernel_constants(platform)
+    poses = to_internal(constants, seed.guess(legs))
+    bad = ~np.all(np.isfinite(poses), axis=-1)
+    poses[bad] = constants[layout.HOME_POSE :][:7]
+    poses = np.ascontiguousarray(poses)
+    return lambda rows: poses[rows]
 
 
 def find_seed(platform: Platform, seed: str | Seed | Pose) -> Seed:
-    """The seed that `solve` was asked for.
+    """Return the seed that an argument of `gough.solve` stands for.
 
     Raises:
-        GoughError: a name that is none; the text lists those there are.
+        GoughError: an unknown name; the text lists those there are.
         PlatformError: a polynomial for a platform without workspace.
     """
     if isinstance(seed, Pose):
@@ -161,3 +156,13 @@ def _shipped(platform: Platform, name: str) -> Seed:
     from gough.seeds.network import NetworkSeed
 
     return NetworkSeed.shipped(platform, name)
+
+
+@lru_cache(maxsize=64)
+def further_starts(platform: Platform, count: int) -> Array:
+    """Internal poses (count, 7) to try when the seed fails: home, then poses about it."""
+    box = platform.workspace or Workspace.about_home(0.2 * platform.size, 40.0)
+    about = box.sample(platform.home, max(count - 1, 0), seed=1)
+    position = np.concatenate([platform.home.position[None], about.position])
+    wxyz = np.concatenate([platform.home.wxyz[None], about.wxyz])
+    return to_internal(kernel_constants(platform), Pose.trusted(position, wxyz))[:count]

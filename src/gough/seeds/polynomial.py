@@ -1,30 +1,77 @@
 """The polynomial first guess: least squares over a platform's workspace.
 
-It is fitted in well under a second and kept on disk under the platform's digest. Which
-monomials there are, and in what order, is fixed here; `polynomial_kernel.py` evaluates them.
+It is fitted in well under a second and kept on disk under the platform's digest. The monomials
+and their order are fixed here; `gough.kernel.polynomial` evaluates them.
 """
 
 from __future__ import annotations
 
+import os
+import zipfile
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
 from math import comb
+from pathlib import Path
 
 import numpy as np
 
 from gough import quaternion
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.kernel import constants as geometry
 from gough.kernel import layout
+from gough.kernel.constants import from_internal, kernel_constants, to_internal
+from gough.kernel.polynomial import evaluate
 from gough.kinematics import assembly_sign, leg_lengths
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.whole_file import replacing
 
+DEGREE = 3  # fast to evaluate, and the first degree that seldom leads to another mode
+DEGREES = range(8)
 SAMPLES_PER_MONOMIAL = 100
 MINIMUM_SAMPLES = 20_000
 CHUNK = 4096  # samples whose terms are in memory at a time
+LARGEST_SINE = np.sin(np.radians(85))  # of a fitted rotation, up to which its sine is fitted
+VERSION = 2  # of the fit: raise it when polynomials on disk are no longer right
+
+
+class PolynomialSeed:
+    """Poses as a polynomial of the readings, fitted for a platform and its workspace.
+
+    Degree 0 is the platform's home pose, whatever the readings.
+
+    Example:
+        >>> seed = gough.PolynomialSeed(gough.Platform.load("reference"), 5)
+        >>> seed.name, seed.polynomial.coefficients.shape
+        ('polynomial-5', (464, 6))
+    """
+
+    def __init__(self, platform: Platform, degree: int = DEGREE) -> None:
+        """Fit the polynomial, or take it from the cache on disk.
+
+        Raises:
+            GoughError: a degree that is not 0 to 7, or a workspace that cannot be reached.
+            PlatformError: the platform states no workspace.
+        """
+        if degree not in DEGREES:
+            raise GoughError(f"degree: expected 0 to 7, found {degree!r}")
+        self.platform, self.degree = platform, degree
+        self.polynomial = fitted(platform, degree)
+
+    @property
+    def name(self) -> str:
+        """As `gough.solve` takes it."""
+        return f"polynomial-{self.degree}" if self.degree else "home"
+
+    def guess(self, legs: Array) -> Pose:
+        """Poses, batch (N,), for readings (N, 6)."""
+        return from_internal(kernel_constants(self.platform), self.kernel_poses(legs))
+
+    def kernel_poses(self, legs: Array) -> Array:
+        """The same poses in the solver's internal form, (N, 7)."""
+        return self.polynomial(np.require(legs, requirements=["C", "W"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,27 +79,42 @@ class Polynomial:
     """Poses as a polynomial of the readings.
 
     Attributes:
-        coefficients: (M, 6) of internal position and Gibbs vector of the turn from the anchor,
-            in the order of `monomials`.
+        coefficients: (M, 6) of internal position and rotation, in the order of `monomials`.
+            With u the last three values, (turn[4] + sqrt(1 - u.u), u) is along the quaternion of
+            the rotation from turn[:4], in base coordinates. So turn[4] = 1 means that u is sin(a)
+            times the axis of a rotation by a, turn[4] = 0 that it is sin(a / 2) times the axis.
         scaling: (2, 6) centre and inverse half range of the readings.
-        anchor: (4,) the quaternion from which turns are counted.
+        turn: (5,) the reference quaternion and the number above.
         degree: total degree.
     """
 
     coefficients: Array
     scaling: Array
-    anchor: Array
+    turn: Array
     degree: int
 
-    def arrays(self) -> tuple:
-        """What the compiled code takes; see `polynomial_kernel.guess_block`."""
-        parent, variable, starts = monomials(self.degree)
-        w, x, y, z = (float(v) for v in self.anchor)
-        return self.coefficients, parent, variable, self.scaling, starts, (w, x, y, z)
+    def __call__(self, legs: Array) -> Array:
+        """Internal poses (N, 7) for readings (N, 6), which are contiguous."""
+        out = np.empty((len(legs), 7))
+        width = 6 * layout.WIDTH
+        work = np.empty(width), np.empty(width), np.empty(self._work_size)
+        evaluate(self._arrays, legs, work, out)
+        return out
+
+    @cached_property
+    def _arrays(self) -> tuple:
+        """Arguments of the compiled code; see `gough.kernel.polynomial.evaluate`."""
+        table = (array.astype(np.uint64) for array in monomials(self.degree))
+        parent, variable, starts = table
+        return self.coefficients, parent, variable, self.scaling, starts, self.turn
+
+    @cached_property
+    def _work_size(self) -> int:
+        return int(2 * layout.WIDTH * np.max(np.diff(monomials(self.degree)[2])))
 
 
 def count(degree: int) -> int:
-    """How many monomials of six variables there are up to `degree`: 1, 7, 28, 84, 210, ..."""
+    """Return how many monomials of six variables there are up to `degree`: 1, 7, 28, 84, ..."""
     return comb(6 + degree, 6)
 
 
@@ -78,13 +140,26 @@ def monomials(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(parent), np.array(variable), np.array(starts)
 
 
+@lru_cache(maxsize=64)
+def fitted(platform: Platform, degree: int) -> Polynomial:
+    """Return the polynomial of a platform: from memory, from disk, or fitted now and kept."""
+    if degree == 0:
+        return constant(platform)
+    path = cache_folder() / f"polynomial-{VERSION}-{degree}-{platform.digest}.npz"
+    found = _read(path, degree)
+    if found is None:
+        found = fit(platform, degree)
+        _write(path, found)
+    return found
+
+
 def constant(platform: Platform) -> Polynomial:
     """Degree 0: home, whatever the readings."""
-    start = geometry.constants(platform)[layout.START :][:7]
+    home = kernel_constants(platform)[layout.HOME_POSE :][:7]
     coefficients = np.zeros((2, 6))
-    coefficients[0, :3] = start[:3]
+    coefficients[0, :3] = home[:3]
     scaling = np.stack([platform.home_legs, np.ones(6)])
-    return Polynomial(coefficients, scaling, start[3:].copy(), 0)
+    return Polynomial(coefficients, scaling, np.append(home[3:], 1.0), 0)
 
 
 def fit(platform: Platform, degree: int, seed: int = 0) -> Polynomial:
@@ -106,11 +181,29 @@ def fit(platform: Platform, degree: int, seed: int = 0) -> Polynomial:
             f"workspace: only {np.sum(good)} of {drawn} sampled poses can be reached without "
             "crossing a singularity; state a smaller workspace"
         )
-    legs, wanted = legs[good], _outputs(platform, pose[good])
+    legs, pose = legs[good], pose[good]
+    wanted, offset = _outputs(platform, pose)
     low, high = legs.min(axis=0), legs.max(axis=0)
     scaling = np.stack([(low + high) / 2, 2 / np.where(high > low, high - low, 2.0)])
     coefficients = _least_squares((legs - scaling[0]) * scaling[1], wanted, degree)
-    return Polynomial(coefficients, scaling, platform.home.wxyz, degree)
+    return Polynomial(coefficients, scaling, np.append(platform.home.wxyz, offset), degree)
+
+
+def _outputs(platform: Platform, pose: Pose) -> tuple[Array, float]:
+    """Values (N, 6) to fit to poses (N,), and the last number of `Polynomial.turn`.
+
+    The sine of the rotation is the antisymmetric part of its matrix, and fits better than the
+    quaternion or the Gibbs vector; beyond a right angle it is not unique, and the quaternion's
+    vector part takes its place.
+    """
+    internal = to_internal(kernel_constants(platform), pose)
+    back = platform.home.inverse().wxyz
+    turn = quaternion.product(pose.wxyz, np.broadcast_to(back, pose.wxyz.shape))
+    turn = np.where(turn[:, :1] < 0, -turn, turn)
+    w, v = turn[:, :1], turn[:, 1:]
+    sine = 2 * w * v
+    small = np.all(w * w > 0.5) and np.all(np.sum(sine**2, axis=-1) < LARGEST_SINE**2)
+    return np.concatenate([internal[:, :3], sine if small else v], axis=-1), float(small)
 
 
 def _least_squares(u: Array, wanted: Array, degree: int) -> Array:
@@ -145,9 +238,33 @@ def _terms(u: Array, degree: int) -> Array:
     return terms
 
 
-def _outputs(platform: Platform, pose: Pose) -> Array:
-    """Internal position and Gibbs vector of the turn from home, (N, 6)."""
-    internal = geometry.to_internal(geometry.constants(platform), pose)
-    back = platform.home.inverse().wxyz
-    turn = quaternion.product(pose.wxyz, np.broadcast_to(back, pose.wxyz.shape))
-    return np.concatenate([internal[:, :3], turn[:, 1:] / turn[:, :1]], axis=-1)
+# ---- fits on disk: a convenience, never a need ----------------------------------------
+
+
+def cache_folder() -> Path:
+    """Return the folder of fits: $GOUGH_CACHE_DIR, else one in the user's cache folder."""
+    chosen = os.environ.get("GOUGH_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gough"
+
+
+def _read(path: Path, degree: int) -> Polynomial | None:
+    """The polynomial in a file; None where there is none, or it is damaged."""
+    try:
+        # opened here, since np.load leaves a damaged file open
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            arrays = file["coefficients"], file["scaling"], file["turn"]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    if [a.shape for a in arrays] != [(len(monomials(degree)[0]), 6), (2, 6), (5,)]:
+        return None
+    return Polynomial(*arrays, degree) if all(np.all(np.isfinite(a)) for a in arrays) else None
+
+
+def _write(path: Path, made: Polynomial) -> None:
+    """Keep a polynomial; a read-only or full disk costs the next process a second, no more."""
+    with suppress(OSError, GoughError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            np.savez(file, coefficients=made.coefficients, scaling=made.scaling, turn=made.turn)

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gough.checks import Array
-from gough.files.placing import PLACED, placed
 from gough.kinematics import leg_lengths, singularity_distance, strut_vectors
+from gough.limit_rules import pose_status
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.status import InverseStatus
 from gough.view import colors
 from gough.view.follow import follow
 
@@ -149,7 +150,7 @@ class Model:
 
     def _placed(self, pose: Pose, legs: Array) -> str:
         row = Pose(pose.position[None], pose.wxyz[None])
-        return PLACED[int(placed(self.platform, row, legs[None])[0])].text
+        return InverseStatus(int(pose_status(self.platform, row, legs[None])[0])].text
 
     def _trouble(self, pose: Pose, legs: Array) -> str | None:
         """Why a pose cannot be shown; None if it can."""

@@ -1,19 +1,21 @@
 """First guesses: what a polynomial is worth, and where it is kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import gough
-from gough.seeds import base as seeds
-from gough.seeds import cache, polynomial
+from gough import quaternion
+from gough.seeds import polynomial
 
 
 @pytest.fixture
 def empty_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("GOUGH_CACHE_DIR", str(tmp_path / "cache"))
-    seeds.fitted.cache_clear()
+    polynomial.fitted.cache_clear()
     yield tmp_path / "cache"
-    seeds.fitted.cache_clear()
+    polynomial.fitted.cache_clear()
 
 
 @pytest.mark.parametrize("degree", range(5))
@@ -42,6 +44,54 @@ def test_errors_over_the_reference_workspace(degree, shift):
     pose = platform.sample_poses(10_000, seed=5)
     guess = gough.PolynomialSeed(platform, degree).guess(gough.leg_lengths(platform, pose))
     assert np.mean(guess.distance(pose)[0]) == pytest.approx(shift, rel=0.05)
+
+
+@pytest.mark.parametrize(("degree", "rotation"), [(3, 0.341), (5, 0.1013)])
+def test_rotation_errors_over_the_reference_workspace(degree, rotation):
+    """Mean rotation error [deg] of the sine of the rotation, as another program found it."""
+    platform = gough.Platform.load("reference")
+    pose = platform.sample_poses(10_000, seed=5)
+    guess = gough.PolynomialSeed(platform, degree).guess(gough.leg_lengths(platform, pose))
+    assert np.degrees(np.mean(guess.distance(pose)[1])) == pytest.approx(rotation, rel=0.05)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.0])
+@pytest.mark.parametrize("degree", [0, 1, 3, 4])
+def test_the_compiled_evaluation_is_the_plain_one(degree, offset):
+    """For full blocks and the rest of one, in both forms of the rotation."""
+    rng = np.random.default_rng(degree)
+    size = len(polynomial.monomials(degree)[0])
+    coefficients = rng.normal(size=(size, 6)) / (4 * size)
+    scaling = np.stack([rng.normal(size=6), rng.uniform(0.5, 2, size=6)])
+    reference = gough.Pose.from_rotation_vector(np.zeros(3), rng.normal(size=3)).wxyz
+    legs = scaling[0] + rng.uniform(-1, 1, size=(150, 6)) / scaling[1]
+    made = polynomial.Polynomial(coefficients, scaling, np.append(reference, offset), degree)
+    terms = polynomial._terms((legs - scaling[0]) * scaling[1], degree)
+    coefficients[~terms.any(axis=0)] = 0  # the padding
+    values = terms @ coefficients
+    u = values[:, 3:]
+    turn = np.column_stack([offset + np.sqrt(1 - np.sum(u**2, axis=1)), u])
+    wxyz = quaternion.product(turn, np.broadcast_to(reference, turn.shape))
+    found = made(legs)
+    np.testing.assert_allclose(found[:, :3], values[:, :3], atol=1e-14)
+    expected = wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)
+    np.testing.assert_allclose(found[:, 3:], expected, atol=1e-14)
+
+
+def test_rotations_beyond_a_right_angle_are_fitted_too():
+    platform = gough.Platform.load("reference").with_workspace(20, 30)
+    home = gough.Pose.from_euler([0, 0, 600], [0, 0, 0.1])
+    wide = replace(
+        platform,
+        home=home,
+        workspace=gough.Workspace([[-5, 5]] * 3, [[-5, 5], [-5, 5], [80, 100]]),
+    )
+    pose = wide.sample_poses(200)
+    values, offset = polynomial._outputs(wide, pose)
+    assert offset == 0.0
+    turn = gough.Pose(np.zeros(3), home.wxyz).inverse()
+    back = gough.Pose(np.zeros((200, 3)), pose.wxyz) @ turn
+    np.testing.assert_allclose(np.abs(values[:, 3:]), np.abs(back.wxyz[:, 1:]), atol=1e-14)
 
 
 def test_a_polynomial_is_reproduced_exactly():
@@ -86,7 +136,7 @@ def test_a_fit_is_kept_and_found_again(empty_cache):
     first = gough.PolynomialSeed(platform, 2)
     (file,) = empty_cache.iterdir()
     assert platform.digest in file.name
-    seeds.fitted.cache_clear()
+    polynomial.fitted.cache_clear()
     before = file.stat().st_mtime_ns
     again = gough.PolynomialSeed(platform, 2)
     assert file.stat().st_mtime_ns == before
@@ -107,8 +157,8 @@ def test_a_damaged_fit_is_made_anew(empty_cache, damage):
         file.write_bytes(b"")
     else:
         bad = first.coefficients[:3] if damage == "shape" else first.coefficients * np.nan
-        np.savez(file, coefficients=bad, scaling=first.scaling, anchor=first.anchor)
-    seeds.fitted.cache_clear()
+        np.savez(file, coefficients=bad, scaling=first.scaling, turn=first.turn)
+    polynomial.fitted.cache_clear()
     again = gough.PolynomialSeed(platform, 2).polynomial
     np.testing.assert_array_equal(first.coefficients, again.coefficients)
 
@@ -117,11 +167,11 @@ def test_a_cache_that_cannot_be_written_is_no_trouble(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("here is no folder")
     monkeypatch.setenv("GOUGH_CACHE_DIR", str(blocked / "cache"))
-    seeds.fitted.cache_clear()
+    polynomial.fitted.cache_clear()
     platform = gough.Platform.load("matlab_stewart")
     assert gough.PolynomialSeed(platform, 2).polynomial.degree == 2
-    assert cache.folder() == blocked / "cache"
-    seeds.fitted.cache_clear()
+    assert polynomial.cache_folder() == blocked / "cache"
+    polynomial.fitted.cache_clear()
 
 
 def test_two_workspaces_are_two_fits():
