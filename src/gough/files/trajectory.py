@@ -119,7 +119,9 @@ class TrajectoryFile:
         stated = rows[:, 2].astype(np.int64)
         outcomes = [
             InverseStatus(code) if one < 0 else Status(one)
-            for code, one in zip(pose_status(self.platform, pose, legs), stated.tolist(), strict=True)
+            for code, one in zip(
+                pose_status(self.platform, pose, legs), stated.tolist(), strict=True
+            )
         ]
         usable = np.all(np.isfinite(legs), axis=-1) & (stated < 0)
         none = np.zeros(len(rows))

@@ -149,8 +149,7 @@ class Model:
         self.numbers, self.asked = pose_numbers(pose), legs.copy()
 
     def _placed(self, pose: Pose, legs: Array) -> str:
-        row = Pose(pose.position[None], pose.wxyz[None])
-        return InverseStatus(int(pose_status(self.platform, row, legs[None])[0])].text
+        return InverseStatus(int(pose_status(self.platform, pose, legs))).text
 
     def _trouble(self, pose: Pose, legs: Array) -> str | None:
         """Why a pose cannot be shown; None if it can."""
