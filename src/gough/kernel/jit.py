@@ -64,7 +64,7 @@ def inner(function: Function | None = None, *, fast: bool = True, inline: bool =
     return decorate if function is None else decorate(function)
 
 
-def inline(function: Function) -> Function:
+def inline(function: Callable) -> Any:
     """Compile a function into its compiled callers, for use as `@inline`; see `inner`."""
     return inner(function, inline=True)
 
