@@ -74,7 +74,7 @@ def run(
             reading=reading_options(
                 platform, keep, keep_bad_rows, ignore_platform, block_rows, log
             ),
-            head=0 if out else head, seed=seed, tol=tolerance, max_iterations=max_iterations,
+            head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
             workers=workers,
         )  # fmt: skip
     return show.print_report(report, machine, legs, out, head, show.print_poses, allow_failures)

@@ -47,7 +47,7 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
     return decorate
 
 
-def inner(function: Function | None = None, *, fast: bool = True, inline: bool = False) -> Any:
+def inner(function: Callable | None = None, *, fast: bool = True, inline: bool = False) -> Any:
     """Compile a function that only compiled code calls, for use as `@inner`.
 
     It gets no entry from Python and no cache file, which saves half of its compile time: it
