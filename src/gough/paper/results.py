@@ -22,7 +22,8 @@ from gough.paper.published import GAMMAS
 from gough.paper.study import KINDS, Study, with_workspace_of
 from gough.plot.histograms import LogHistogram
 from gough.pose import Pose
-from gough.seeds.base import PolynomialSeed, Seed
+from gough.seeds.base import Seed
+from gough.seeds.polynomial import PolynomialSeed
 
 POLYNOMIALS = tuple(f"polynomial-{degree}" for degree in DEGREES)
 OTHER_F_MAX = (15, 17, 40)  # inner iterations that the iteration table tries
