@@ -244,7 +244,7 @@ WRONG_TOML = {
     ),
     "motor stroke in degrees": (
         "stroke = [-45.0, 60.0]\n" + ROTARY_TOML,
-        "stroke: motor angles are in rad, and -45 is more than a turn; if it is degrees, write -0.78",
+        "stroke: motor angles are in rad, and -45 is more than a turn; if it is degrees, ",
     ),
 }  # fmt: skip
 
