@@ -80,10 +80,10 @@ def solve_file(
     """
     from gough.fk.solve import Solver
 
-    solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
     report = Report(tuple(Status), head)
     written = solution_names(angles, leg_noise is not None, certify)
     with _open_job(legs, out, platform, reading, file_leg_columns, written) as job:
+        solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
         for block in job.blocks:
             readings = block.numbers(LEGS)
             if report.rows == 0:

@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ from gough.limit_rules import pose_status
 from gough.platform import Platform
 from gough.pose import Pose, poses_from_columns
 from gough.status import InverseStatus, Outcome, Status
+
+if TYPE_CHECKING:
+    from gough.fk.solve import Solver
 
 UNUSABLE = {status.label: status for status in Status if not status.usable}
 
@@ -128,10 +132,12 @@ class TrajectoryFile:
         return Trajectory(number, time, pose, legs, outcomes, usable, none, none.astype(np.int32))
 
     @cached_property
-    def _solver(self) -> Callable:
-        from gough.fk.solve import solve
+    def _solver(self) -> Solver:
+        from gough.fk.solve import (
+            Solver,  # Numba takes a second, which a file of poses need not wait
+        )
 
-        return partial(solve, self.platform, seed=self.seed)
+        return Solver(self.platform, self.seed)
 
 
 @contextmanager
