@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from scipy.spatial.transform import Rotation
 
+ROTATION = 1e-6  # how far R R^T of a matrix may be from 1
 UNIT_LENGTH = 1e-3  # a quaternion whose length is farther from 1 is taken for a mistake
 
 
@@ -303,7 +304,7 @@ def _common_batch(name: str, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[in
 def _check_rotations(matrices: Array) -> None:
     """Raise GoughError unless matrices (..., 3, 3) are rotations to 1e-6; rows of NaN pass."""
     square = matrices @ np.swapaxes(matrices, -1, -2)
-    skewed = np.any(np.abs(square - np.eye(3)) > 1e-6, axis=(-2, -1))
+    skewed = np.any(np.abs(square - np.eye(3)) > ROTATION, axis=(-2, -1))
     mirrored = np.linalg.det(np.where(np.isfinite(matrices), matrices, np.eye(3))) < 0
     if np.any(skewed):
         raise GoughError(

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 from gough.checks import Array, one_or_six, platform_field
 from gough.errors import PlatformError
 
+RIGHT_ANGLE = 1e-6  # how far axes may be from unit length and from right angles
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class RotaryArms:
@@ -62,7 +64,7 @@ class RotaryArms:
             raise PlatformError(f"rotary.branch: expected six of 1 or -1, found {found}")
         for i in range(6):
             x, y = self.axis_x[i], self.axis_y[i]
-            if max(abs(x @ x - 1), abs(y @ y - 1), abs(x @ y)) > 1e-6:
+            if max(abs(x @ x - 1), abs(y @ y - 1), abs(x @ y)) > RIGHT_ANGLE:
                 raise PlatformError(
                     f"rotary.axis_x[{i}], axis_y[{i}]: expected two unit vectors at right "
                     f"angles, found {x.tolist()} and {y.tolist()}"
