@@ -96,7 +96,7 @@ def test_errors_of_several_files(gough_command):
         (["pose", "1", "2", "3", "4", "5", "six", "-p", "reference"], "six"),
         (["pose", "1", "2", "3", "4", "5", "nan", "-p", "reference"], "finite"),
         (["pose", *SIX, "--legs", *SIX, "-p", "reference"], "not both"),
-        (["pose", "--legs", *["nan"] * 6, "-p", "reference"], "no numbers"),
+        (["pose", "--legs", *["nan"] * 6, "-p", "reference"], "holds NaN"),
         (["pose", str(EXAMPLE), "--row", "5000", "-p", "rubin_camera"], "rows are 1 to 1000"),
         (["pose", "-p", "reference", "-o", "a.jpg"], "must end in .svg, .png or .pdf"),
         (["pose", "-p", "reference", "-o", "no/a.svg"], "there is no folder"),

@@ -16,8 +16,7 @@ pytest.importorskip("matplotlib")
 import gough
 from gough.files import Reading
 from gough.plot import LogHistogram, histogram_figure
-from gough.plot.histograms import PER_DECADE
-from gough.plot.rows import read_errors
+from gough.plot.histograms import PER_DECADE, read_errors
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 
@@ -122,8 +121,8 @@ def test_errors_are_distances_from_the_true_poses(tmp_path, name, rows):
         write(tmp_path / "b.parquet", true), reading=Reading(block_rows=rows),
     )  # fmt: skip
     shift, turn = found.distance(true)
-    assert result["shift"].largest == shift.max()
-    np.testing.assert_allclose(result["turn"].largest, np.degrees(turn.max()))
+    assert result["position"].largest == shift.max()
+    np.testing.assert_allclose(result["rotation"].largest, np.degrees(turn.max()))
     assert result["residual"].largest == 1
     assert [h.count for h in result.values()] == [20, 20, 20]
 
@@ -137,7 +136,7 @@ def test_unusable_rows_are_left_out_unless_asked_for(tmp_path):
     )  # fmt: skip
     assert read_errors(path, platform)["residual"].left_out == 2
     assert read_errors(path, platform)["residual"].largest == 1e-9
-    assert read_errors(path, platform, path, all_rows=True)["shift"].count == 3
+    assert read_errors(path, platform, path, all_rows=True)["position"].count == 3
 
 
 @pytest.mark.parametrize(("rows", "words"), [(19, "fewer rows"), (21, "more rows")])
@@ -154,4 +153,4 @@ def test_a_file_without_residuals_needs_a_truth(tmp_path):
     path = write(tmp_path / "a.parquet", platform.sample_poses(20))
     with pytest.raises(gough.InputError, match="--truth POSES"):
         read_errors(path, platform)
-    assert set(read_errors(path, platform, path)) == {"shift", "turn"}
+    assert set(read_errors(path, platform, path)) == {"position", "rotation"}

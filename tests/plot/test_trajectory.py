@@ -18,8 +18,8 @@ import gough
 from gough.columns import LEGS
 from gough.files import Reading
 from gough.plot import Envelope, trajectory_figure
-from gough.plot.rows import read_pose, read_trajectory
-from gough.plot.trajectory import SIGNALS, note, signals
+from gough.plot.pose import read_pose
+from gough.plot.trajectory import SIGNALS, note, read_trajectory, signals
 
 MACHINES = ("reference", "nasa_msfc", "rubin_camera", "reachy_mini", "dietmaier")
 
@@ -104,7 +104,7 @@ def test_rows_without_an_answer_keep_their_readings_and_lose_their_pose(tmp_path
     for axes in figure.axes:
         crosses = [line for line in axes.get_lines() if line.get_marker() == "x"]
         assert np.asarray(crosses[0].get_xdata()).tolist() == [5, 10]
-    assert "2 rows without a usable answer" in note(envelope)
+    assert "2 rows without a usable pose" in note(envelope)
 
 
 def test_unusable_statuses_of_a_solved_file_count_as_no_answer(tmp_path):
@@ -126,6 +126,11 @@ def test_time_comes_from_a_column(tmp_path):
     envelope = read_trajectory(path, platform, time="seconds")
     np.testing.assert_allclose(envelope.x, [0.5, 1.0, 1.5, 3.0])  # a gap is bridged
     assert trajectory_figure(platform, envelope, time="seconds").axes[-1].get_xlabel() == "seconds"
+    for name, label in {"t": "t [s]", "time_ms": "time [ms]", "t [min]": "t [min]"}.items():
+        assert trajectory_figure(platform, envelope, time=name).axes[-1].get_xlabel() == label
+    rows = trajectory_figure(platform, envelope).axes[-1]
+    assert rows.get_xlabel() == "row"
+    assert all(float(tick).is_integer() for tick in rows.get_xticks())
     with pytest.raises(gough.InputError, match="did you mean 'seconds'"):
         read_trajectory(path, platform, time="second")
 

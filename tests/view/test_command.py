@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from gough import GoughError, cli
-from gough.view import server as servers
+from gough.view import scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rubin_camera_legs.csv"
 
@@ -82,7 +82,7 @@ def test_a_mistake_is_one_line(view, tmp_path, monkeypatch, arguments, message):
 
 
 def test_without_viser_it_says_how_to_get_it(view, monkeypatch):
-    monkeypatch.delitem(sys.modules, "gough.view.server", raising=False)
+    monkeypatch.delitem(sys.modules, "gough.view.panel", raising=False)
     monkeypatch.delitem(sys.modules, "gough.view.viewer", raising=False)
     monkeypatch.delitem(sys.modules, "gough.view.export", raising=False)
     monkeypatch.setitem(sys.modules, "viser", None)
@@ -96,7 +96,7 @@ def test_a_port_that_is_taken_is_not_shared():
         other.bind(("127.0.0.1", 0))
         other.listen()
         with pytest.raises(GoughError, match=r"already in use at 127\.0\.0\.1; pass another"):
-            servers.start("localhost", other.getsockname()[1], "test")
+            scene.open_server("localhost", other.getsockname()[1], "test")
 
 
 def test_it_takes_the_next_port_that_is_free(monkeypatch):
@@ -104,12 +104,12 @@ def test_it_takes_the_next_port_that_is_free(monkeypatch):
         other.bind(("127.0.0.1", 0))
         other.listen()
         first = other.getsockname()[1]
-        monkeypatch.setattr(servers, "FIRST_PORT", first)
-        server = servers.start("localhost", None, "test")
+        monkeypatch.setattr(scene, "FIRST_PORT", first)
+        server = scene.open_server("localhost", None, "test")
         try:
-            assert first < server.get_port() < first + servers.PORTS_TRIED
+            assert first < server.get_port() < first + scene.PORTS_TRIED
         finally:
-            servers.stop(server)
+            scene.close_server(server)
 
 
 def test_ctrl_c_ends_it_quietly():

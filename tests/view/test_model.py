@@ -8,11 +8,11 @@ from machines import scaled
 
 import gough
 from gough import Platform, Pose
-from gough.status import Status
-from gough.view import colors
-from gough.view.follow import BLOCKED, follow, has_pose
-from gough.view.model import STAYS, Answer, Model, pose_numbers
-from gough.view.ranges import leg_factor, leg_ranges, pose_ranges
+from gough.skeleton import outside_stroke
+from gough.view import meshes
+from gough.view.follow import BLOCKED, REFUSED, follow, has_pose
+from gough.view.model import UNCHANGED, Answer, Model, leg_factor, pose_numbers
+from gough.view.panel import leg_ranges, pose_ranges
 
 CATALOG = Platform.catalog()
 
@@ -129,7 +129,7 @@ def test_a_picked_mode_keeps_the_legs_and_is_followed_on():
     model = Model(platform)
     modes = gough.assembly_modes(platform, model.legs)
     other = int(np.argmax(modes.sign < 0))
-    model.pick(modes.pose[other], float(modes.residual[other]), "assembly mode")
+    model.pick(modes.pose[other], float(modes.residual[other]))
     assert model.answer.reached
     assert np.array_equal(model.legs, platform.home_legs)
     assert gough.assembly_sign(platform, model.pose) == -1
@@ -147,7 +147,7 @@ def test_every_mode_of_a_rotary_machine_can_be_picked_and_left():
     assert len(modes) > 1
     for i in range(len(modes)):
         model = Model(platform)
-        model.pick(modes.pose[i], 0.0, "assembly mode")
+        model.pick(modes.pose[i], 0.0)
         assert np.array_equal(model.legs, platform.home_legs)
         model.ask_legs({1: platform.home_legs[1] + 0.01})
         assert model.answer.reached, model.answer.text
@@ -167,9 +167,9 @@ def test_impossible_legs_leave_the_picture_and_say_why(platform):
     assert not model.answer.reached
     assert model.pose is pose
     assert np.array_equal(model.legs, legs)
-    assert model.answer.text.endswith(STAYS)
-    assert model.answer.text.startswith((Status.UNREACHABLE.text, BLOCKED))
-    # the legs show the wish, all else the picture
+    assert model.answer.text.endswith(UNCHANGED)
+    assert model.answer.text.startswith((REFUSED["unreachable"], BLOCKED))
+    # the leg sliders show the request, all else the picture
     assert model.asked[2] == far
     np.testing.assert_array_equal(model.numbers, pose_numbers(pose))
     # and dragging back leads on from the picture
@@ -184,9 +184,9 @@ def test_a_pose_beyond_the_motors_names_them():
     model.ask_numbers({2: 0.4})
     assert not model.answer.reached
     assert model.pose is platform.home
-    assert "out of reach of motor 1, 2, 3, 4, 5, 6" in model.answer.text
+    assert "too short for this pose: motor 1, 2, 3, 4, 5, 6" in model.answer.text
     assert model.numbers[2] == 0.4
-    model.forget()
+    model.undo()
     np.testing.assert_array_equal(model.numbers, pose_numbers(platform.home))
 
 
@@ -206,7 +206,7 @@ def test_readings_that_are_none_move_nothing(bad):
     model = Model(Platform.load("reference"))
     model.ask_legs({0: bad})
     assert not model.answer.reached
-    assert model.answer.text.startswith(Status.INVALID_INPUT.text)
+    assert model.answer.text.startswith(REFUSED["invalid_input"])
     assert model.pose is model.platform.home
 
 
@@ -238,16 +238,16 @@ def test_colours_tell_where_legs_stand_in_their_stroke():
     assert platform.stroke is not None
     low, high = platform.stroke[0]
     legs = np.array([low, (low + high) / 2, high, low - 1e-4, high + 1e-4, 0.0])
-    paint = [tuple(row) for row in colors.leg_colors(platform, legs)]
-    wanted = [*colors.RAMP, colors.OUT, colors.OUT, colors.GREEN]
-    assert paint == [colors.rgb(name) for name in wanted]
-    assert colors.out_of_stroke(platform, legs).tolist() == [False] * 3 + [True] * 2 + [False]
+    paint = [tuple(row) for row in meshes.leg_colors(platform, legs)]
+    wanted = [*meshes.RAMP, meshes.OUT, meshes.OUT, meshes.GREEN]
+    assert paint == [meshes.rgb(name) for name in wanted]
+    assert outside_stroke(platform, legs).tolist() == [False] * 3 + [True] * 2 + [False]
 
 
 def test_without_a_stroke_legs_are_grey_and_none_is_out():
     platform = Platform.load("reference")
-    assert (colors.leg_colors(platform, platform.home_legs) == colors.rgb(colors.GREY)).all()
-    assert not colors.out_of_stroke(platform, np.full(6, 1e9)).any()
+    assert (meshes.leg_colors(platform, platform.home_legs) == meshes.rgb(meshes.GREY)).all()
+    assert not outside_stroke(platform, np.full(6, 1e9)).any()
 
 
 def test_sliders_hold_home_stroke_and_workspace(platform):
@@ -272,3 +272,35 @@ def test_a_slider_grows_to_hold_a_value():
     assert not one.reach(high)
     assert one.reach(-600.0)
     assert one.low < -600 < low < high == one.high
+
+
+# ---- limits and undo -------------------------------------------------------------------
+
+
+def test_a_pose_beyond_its_limits_is_shown_and_the_limits_are_named():
+    model = Model(Platform.load("rubin_camera"))
+    assert model.answer.text == "Within stroke and workspace."
+    model.ask_legs({4: 0.0145})
+    assert model.answer.reached
+    assert model.answer.text.startswith("Shown beyond its limits: leg 5 above its stroke by ")
+    assert not model.within_limits
+    assert Model(Platform.load("dietmaier")).answer.text == "Within workspace."
+
+
+def test_undo_goes_back_move_by_move():
+    model = Model(Platform.load("reference"))
+    for height in (610.0, 620.0):
+        model.remember()
+        model.ask_numbers({2: height})
+    model.remember()
+    model.ask_legs({0: 1e5})
+    assert not model.answer.reached
+    model.undo()  # the sliders
+    assert model.answer.reached
+    assert model.numbers[2] == 620
+    model.undo()
+    assert model.numbers[2] == 610
+    model.undo()
+    assert model.pose is model.platform.home
+    model.undo()
+    assert model.pose is model.platform.home

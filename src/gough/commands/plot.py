@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -15,6 +14,7 @@ from gough.commands.options import BlockRows, IgnorePlatform, KeepBadRows, Platf
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from gough.files.rows import Source
     from gough.platform import Platform
     from gough.pose import Pose
 
@@ -42,7 +42,7 @@ def pose(
     row: Annotated[int, arg(metavar="N")] = 1,
     out: Picture = None,
 ) -> int:
-    """A pose in 3-D, with the readings of its legs within their strokes.
+    """Draw a pose in 3-D, with the readings of its legs within their strokes.
 
     gough plot pose -p rubin_camera
 
@@ -53,25 +53,26 @@ def pose(
     Args:
         pose: x y z in the platform's unit and rx ry rz in degrees (R = Rx Ry Rz), or a .csv or
             .parquet file of poses or leg readings; without it, and without --legs, home.
-        legs: six readings to solve, whose pose is drawn.
-        row: of the file, counted from 1.
+        legs: solve six readings and draw their pose.
+        row: number of the row in the file, from 1.
     """
     from gough.plot.pose import pose_figure
 
     machine = _machine(platform, out, "pose")
     found = _pose(machine, pose, legs, row)
-    shift, turn = found.distance(machine.home)
-    ghost = machine.home if shift > 1e-9 * machine.size or turn > 1e-9 else None
+    translation, rotation = found.distance(machine.home)
+    away = translation > 1e-9 * machine.size or rotation > 1e-9
+    ghost = machine.home if away else None
     return _save(pose_figure(machine, found, ghost=ghost), machine, out, "pose")
 
 
 def modes(legs: Legs = (), *, platform: PlatformName, out: Picture = None) -> int:
-    """All poses that six leg readings allow, in one figure; see gough modes.
+    """Draw all poses that have six leg readings; see gough modes.
 
     gough plot modes -p dietmaier -o modes.svg
 
     Args:
-        legs: six readings, or a .csv or .parquet file, of which the first row counts; without
+        legs: six readings, or a .csv or .parquet file, of which the first row is used; without
             them, those of the home pose.
     """
     from gough.modes.assembly import assembly_modes
@@ -98,10 +99,10 @@ def workspace(
         tuple[float, float, float, float] | None,
         arg(metavar="A1 A2 B1 B2", help_behavior_hint=""),
     ] = None,
-    resolution: Annotated[int, arg(metavar="N")] = 181,
+    resolution: Annotated[int, arg(metavar="N")] = 361,
     out: Picture = None,
 ) -> int:
-    """A slice of the workspace: distance to singularity, stroke limits.
+    """Draw a slice of the workspace: distance to singularity, stroke limits.
 
     gough plot workspace -p nasa_msfc --axes x z
 
@@ -111,12 +112,12 @@ def workspace(
 
     Args:
         axes: two of x, y, z, rx, ry, rz.
-        x: held at this value, where it is no axis; else at home's, as are the others.
-        y: see x.
-        z: see x.
-        rx: see x.
-        ry: see x.
-        rz: see x.
+        x: fixed value of x, where it is not an axis; without it, that of home.
+        y: fixed value of y, as for x.
+        z: fixed value of z, as for x.
+        rx: fixed value of rx, as for x.
+        ry: fixed value of ry, as for x.
+        rz: fixed value of rz, as for x.
         span: lowest and highest value of the first, then of the second axis; without it a
             little more than workspace and stroke allow.
         resolution: poses along each axis.
@@ -141,28 +142,28 @@ def trajectory(
     ignore_platform: IgnorePlatform = False,
     block_rows: BlockRows = 65536,
 ) -> int:
-    """Leg readings and pose over the rows of a file, with the stroke limits.
+    """Draw leg readings and pose over the rows of a file, with the stroke limits.
 
     gough plot trajectory legs.csv -p rubin_camera --time time
 
-    Rows without a usable answer are marked.
-
-    Of a long file, a band from the lowest to the highest of many rows is drawn.
+    Rows without a usable pose are marked. In long files, bands from the lowest to the highest
+    value of many rows replace lines.
 
     Args:
         file: .csv or .parquet with columns of poses or leg_1 to leg_6, or - for CSV on
             standard input.
-        time: column of the horizontal axis; without it rows are counted.
+        time: column on the horizontal axis, in seconds unless its name ends in a unit, as in
+            time_ms; without it, row numbers.
         seed: first guess for leg readings, as in gough solve.
     """
     from gough.commands.options import reading_options
-    from gough.plot.rows import read_trajectory
-    from gough.plot.trajectory import note, trajectory_figure
+    from gough.plot.trajectory import note, read_trajectory, trajectory_figure
 
     machine = _machine(platform, out, "trajectory")
     reading = reading_options(platform, "", keep_bad_rows, ignore_platform, block_rows)
-    with _ticking() as tick:
-        envelope = read_trajectory(file, machine, time=time, seed=seed, reading=reading, tick=tick)
+    envelope = read_trajectory(
+        file, machine, time=time, seed=seed, reading=reading, tick=_check_signals
+    )
     figure = trajectory_figure(machine, envelope, time=time or "row",
                                title=f"{machine.name}: {_name(file)}")  # fmt: skip
     code = _save(figure, machine, out, "trajectory")
@@ -183,7 +184,7 @@ def errors(
     ignore_platform: IgnorePlatform = False,
     block_rows: BlockRows = 65536,
 ) -> int:
-    """Histograms of residuals and errors of solved files, on logarithmic axes.
+    """Draw histograms of residuals and errors of solved files, on logarithmic axes.
 
     gough plot errors poses.parquet -p reference
 
@@ -192,12 +193,11 @@ def errors(
     Args:
         files: .csv or .parquet as gough solve writes them, one or several to compare.
         truth: the true poses, row for row, to compare the files' poses with.
-        all_rows: count rows whose status is not usable, too, such as first guesses.
+        all_rows: include rows whose status is not usable, such as first guesses.
     """
     from gough.commands.options import reading_options
     from gough.errors import InputError
-    from gough.plot.histograms import histogram_figure
-    from gough.plot.rows import read_errors
+    from gough.plot.histograms import histogram_figure, read_errors
     from gough.plot.style import length_unit
 
     if not files:
@@ -207,13 +207,14 @@ def errors(
     unit = length_unit(machine)
     labels = {
         "residual": f"residual: largest leg error [{unit}]",
-        "shift": f"position error [{unit}]",
-        "turn": "rotation error [deg]",
+        "position": f"position error [{unit}]",
+        "rotation": "rotation error [deg]",
     }
     panels: dict[str, dict[str, Any]] = {}
     for file in files:
-        with _ticking() as tick:
-            found = read_errors(file, machine, truth, all_rows=all_rows, reading=reading, tick=tick)
+        found = read_errors(
+            file, machine, truth, all_rows=all_rows, reading=reading, tick=_check_signals
+        )
         for quantity, histogram in found.items():
             panels.setdefault(labels[quantity], {})[file] = histogram
     return _save(histogram_figure(panels, title=machine.name), machine, out, "errors")
@@ -234,12 +235,12 @@ FIGURES: dict[str, Callable[..., int]] = {
 def _pose(
     machine: Platform, given: tuple[str, ...], legs: tuple[str, ...] | None, row: int
 ) -> Pose:
-    """The pose that the command line means."""
+    """Pose that the command line gives."""
     import numpy as np
 
     from gough.errors import InputError
     from gough.fk.solve import solve
-    from gough.plot.rows import read_pose
+    from gough.plot.pose import read_pose
     from gough.pose import Pose
 
     if legs is not None:
@@ -260,7 +261,7 @@ def _pose(
 
 
 def _machine(platform: str, out: str | None, figure: str) -> Platform:
-    """The platform; that the picture can be written is checked before any work is done."""
+    """Load the platform, and check first that the picture can be written."""
     from gough.platform import Platform
     from gough.plot.style import check_picture
 
@@ -270,7 +271,7 @@ def _machine(platform: str, out: str | None, figure: str) -> Platform:
 
 
 def _target(machine: Platform, out: str | None, figure: str) -> str:
-    """The picture's name: the one given, or a new one in this folder."""
+    """Path of the picture: the one given, or a new one in this folder."""
     from gough.errors import GoughError
 
     if out is not None:
@@ -291,12 +292,11 @@ def _save(figure: Figure, machine: Platform, out: str | None, name: str) -> int:
     return 0
 
 
-@contextmanager
-def _ticking():
-    """What to call after every block: it ends the command if a signal has asked for it."""
+def _check_signals(_: Source) -> None:
+    """End the command after a block of rows if a signal has arrived."""
     from gough.commands import signals
 
-    yield lambda source: signals.check()
+    signals.check()
 
 
 def _name(file: str) -> str:

@@ -1,4 +1,4 @@
-"""gough view: a machine in the browser, to look at and to drive."""
+"""gough view: a machine in the browser."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def run(
     keep_bad_rows: Annotated[bool, arg(help_behavior_hint="")] = False,
     ignore_platform: Annotated[bool, arg(help_behavior_hint="")] = False,
 ) -> int:
-    """See a machine in the browser, and drive it.
+    """Show a machine in the browser, and move it by legs, by pose or by hand.
 
     gough view -p reachy_mini
 
@@ -42,20 +42,20 @@ def run(
 
     gough view -p reference --html reference.html
 
-    Legs and pose follow each other's sliders; Ctrl-C ends it.
+    Serves the page until Ctrl-C.
 
     Exit code of --html: 0: written; 1: written, but a row shown has no pose.
 
     Args:
-        file: .csv or .parquet with poses or leg readings to play.
+        file: play a .csv or .parquet file of poses or leg readings.
         html: write a page that opens without gough and without a network, and end.
-        host: where to listen; 0.0.0.0 lets the whole network in.
-        port: which port to listen at; without it the first free one from 8080.
+        host: name or address to listen at; 0.0.0.0 opens the page to the whole network.
+        port: port to listen at; without it the first free one from 8080.
         open_browser: open the page in this computer's browser.
-        rows: show at most so many rows of the file, evenly spread over it.
-        time: a column with times [s]; without it 30 rows are played in a second.
+        rows: largest number of rows shown, evenly spread over the file.
+        time: column of times [s]; without it 30 rows are played per second.
         keep_bad_rows: show rows with text in a number column as rows without a pose.
-        ignore_platform: take the numbers of a file that was written for another platform.
+        ignore_platform: read a file that was written for another platform.
     """
     from gough.platform import Platform
 
@@ -102,8 +102,8 @@ def _serve(
 
 
 def _announce(viewer: Viewer, host: str, port: int | None, browser: bool) -> None:
-    """Where the page is, and how to reach it from elsewhere."""
-    from gough.view.server import FIRST_PORT
+    """Print the address of the page, and the way to it from another computer."""
+    from gough.view.scene import FIRST_PORT
 
     if port is None and viewer.port != FIRST_PORT:
         print(f"port {FIRST_PORT} is taken; this is at {viewer.port}")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, closing
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,9 +12,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from gough.checks import Array
-from gough.errors import GoughError
+from gough.columns import pose_columns
+from gough.errors import GoughError, InputError
+from gough.files.formats import open_source
+from gough.files.rows import Reading, Source
+from gough.files.trajectory import read_columns, unusable_status
+from gough.platform import Platform
 from gough.plot.style import CURVES, GREY, new_figure, styled
+from gough.pose import Pose, poses_from_columns
 
+RESIDUAL = "residual"
 PER_DECADE = 5  # bars in a picture
 FINER = 10  # bins behind each bar, from which quantiles are read
 LOWEST, HIGHEST = -324, 309  # decades that float64 has
@@ -20,11 +29,11 @@ _FINE = PER_DECADE * FINER
 
 
 class LogHistogram:
-    """How many values fall into each fiftieth of a decade; any number of them, in little memory.
+    """Number of values in each fiftieth of a decade, for any number of values in little memory.
 
     Attributes:
-        count: finite values seen.
-        zeros: how many of them are exactly zero.
+        count: finite values added.
+        zeros: number of them that are exactly zero.
         left_out: values that are NaN or infinite.
         largest: the largest value, exactly.
     """
@@ -35,13 +44,13 @@ class LogHistogram:
 
     @classmethod
     def of(cls, values: Array) -> LogHistogram:
-        """The histogram of values (N,)."""
+        """Histogram of values (N,)."""
         histogram = cls()
         histogram.add(values)
         return histogram
 
     def add(self, values: Array) -> None:
-        """More values (n,), none below zero."""
+        """Add values (n,), none below zero."""
         finite = values[np.isfinite(values)]
         self.left_out += len(values) - len(finite)
         if not len(finite):
@@ -57,7 +66,7 @@ class LogHistogram:
                                   minlength=len(self._bins))  # fmt: skip
 
     def as_dict(self) -> dict:
-        """What JSON can hold; `from_dict` takes it back."""
+        """Content as numbers and lists, for JSON; `from_dict` reads it."""
         first, last = self.range
         return {
             "first": first, "last": last, "bins": self._bins[_bins(first, last)].tolist(),
@@ -67,7 +76,7 @@ class LogHistogram:
 
     @classmethod
     def from_dict(cls, facts: dict) -> LogHistogram:
-        """The histogram that `as_dict` told of, or one with coarser bins that divide ours."""
+        """Histogram from `as_dict`; its bins may be coarser, by a whole factor."""
         histogram = cls()
         histogram.count, histogram.zeros = facts["count"], facts["zeros"]
         histogram.left_out, histogram.largest = facts["left_out"], facts["largest"]
@@ -78,7 +87,7 @@ class LogHistogram:
 
     @property
     def range(self) -> tuple[int, int]:
-        """The decades [first, last) that hold values above zero; (0, 0) if none does."""
+        """Decades [first, last) that hold the values above zero; (0, 0) without any."""
         found = np.flatnonzero(self._bins)
         if not len(found):
             return 0, 0
@@ -90,12 +99,70 @@ class LogHistogram:
         return fine.reshape(-1, FINER).sum(axis=1) / max(self.count, 1)
 
     def quantile(self, share: float) -> float:
-        """A value that at least `share` of all do not exceed: the upper edge of its bin."""
+        """Upper edge of the bin below which at least `share` of all values lie."""
         wanted = int(np.ceil(share * self.count)) - self.zeros
         if wanted <= 0:
             return 0.0
         place = int(np.searchsorted(np.cumsum(self._bins), wanted))
         return min(10.0 ** ((place + 1) / _FINE + LOWEST), self.largest)
+
+
+def read_errors(
+    path: str | Path,
+    platform: Platform,
+    truth: str | Path | None = None,
+    *,
+    all_rows: bool = False,
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+    tick: Callable[[Source], None] | None = None,
+) -> dict[str, LogHistogram]:
+    """Read a file of solved poses into histograms of its errors.
+
+    Rows whose status is not usable are left out, and their number is kept.
+
+    Args:
+        path: poses, as `gough solve` writes them.
+        truth: the true poses, row for row.
+        all_rows: keep rows whatever their status, such as first guesses.
+
+    Returns:
+        "residual" [platform unit] where the file has that column; "position" [platform unit]
+        and "rotation" [deg] where there is a truth.
+
+    Raises:
+        GoughError, InputError: an error in a file; different numbers of rows; neither a column
+            of residuals nor a truth.
+    """
+    with ExitStack() as stack:
+        source = stack.enter_context(closing(open_source(path, platform, reading)))
+        residual = (RESIDUAL,) if RESIDUAL in source.columns else ()
+        if truth is None and not residual:
+            raise InputError(
+                f"{path}: no column residual, as gough solve writes it; pass --truth POSES to "
+                "compare its poses with true ones"
+            )
+        names = pose_columns(source.where, source.columns) if truth is not None else ()
+        found = {name: LogHistogram() for name in residual}
+        true = None
+        if truth is not None:
+            opened = stack.enter_context(closing(open_source(truth, platform, reading)))
+            true = _Feed(opened, reading)
+            found |= {"position": LogHistogram(), "rotation": LogHistogram()}
+        for block in read_columns(source, (*names, *residual), reading):
+            answered = (unusable_status(block) < 0) | all_rows
+            if residual:
+                values = block.numbers(residual)[:, 0]
+                found[RESIDUAL].add(np.where(answered, values, np.nan))
+            if true is not None:
+                pose, _ = poses_from_columns(block.numbers(names), names)
+                translation, rotation = pose.distance(true.take(len(block), source.where))
+                found["position"].add(np.where(answered, translation, np.nan))
+                found["rotation"].add(np.where(answered, np.degrees(rotation), np.nan))
+            if tick:
+                tick(source)
+        if true is not None:
+            true.finish(source.where)
+    return found
 
 
 @styled
@@ -119,11 +186,11 @@ def draw_histogram(axes: Axes, series: Mapping[str, LogHistogram], label: str) -
     """Shares of values in each fifth of a decade, both axes logarithmic.
 
     Values of exactly zero have no place on a logarithmic axis: they stand at the left, at the
-    mark 0. The legend tells how many values there are, and the largest.
+    mark 0. The legend gives the number of values, quantiles and the largest.
 
     Args:
         series: name -> histogram.
-        label: of the horizontal axis, with its unit in brackets.
+        label: label of the horizontal axis, with its unit in brackets.
     """
     ranges = [h.range for h in series.values() if h.range != (0, 0)] or [(0, 1)]
     first, last = min(r[0] for r in ranges), max(r[1] for r in ranges)
@@ -149,7 +216,7 @@ def draw_histogram(axes: Axes, series: Mapping[str, LogHistogram], label: str) -
 
 
 def _bins(first: int, last: int) -> slice:
-    """Where the bins of the decades [first, last) stand."""
+    """Indices of the bins of the decades [first, last)."""
     return slice((first - LOWEST) * _FINE, (last - LOWEST) * _FINE)
 
 
@@ -185,3 +252,33 @@ def _legend(name: str, histogram: LogHistogram) -> str:
 
 def _cycle(count: int) -> list:
     return [CURVES[i % len(CURVES)] for i in range(count)]
+
+
+class _Feed:
+    """Poses of a file, in pieces of any length."""
+
+    def __init__(self, source: Source, reading: Reading) -> None:
+        self._where = source.where
+        self._names = pose_columns(source.where, source.columns)
+        self._blocks = read_columns(source, self._names, reading)
+        self._values: Array = np.empty((0, len(self._names)))
+
+    def take(self, count: int, beside: str) -> Pose:
+        """The next `count` poses."""
+        while len(self._values) < count:
+            block = next(self._blocks, None)
+            if block is None:
+                raise InputError(
+                    f"{self._where}: has fewer rows than {beside}; expected one true pose for each"
+                )
+            self._values = np.concatenate([self._values, block.numbers(self._names)])
+        values, self._values = self._values[:count], self._values[count:]
+        return poses_from_columns(values, self._names)[0]
+
+    def finish(self, beside: str) -> None:
+        """Raise InputError if rows are left."""
+        left = len(self._values) or len(next(self._blocks, ()))
+        if left:
+            raise InputError(
+                f"{self._where}: has more rows than {beside}; expected one true pose for each"
+            )

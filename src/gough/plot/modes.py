@@ -15,11 +15,22 @@ from gough.errors import GoughError
 from gough.kinematics import equivalent_struts, joint_positions
 from gough.modes.choose import choose_mode
 from gough.modes.result import AssemblyModes
-from gough.plot.shapes import outline_order
-from gough.plot.style import BLUE, FAINT, GREY, VERMILION, length_unit, new_figure, styled
+from gough.plot.style import (
+    BLUE,
+    FAINT,
+    GREY,
+    VERMILION,
+    length_unit,
+    new_figure,
+    pose_text,
+    styled,
+)
+from gough.skeleton import outline_order
 
 Look = tuple[str, Literal["-", "--"]]  # colour and line
-LEFT, LEAST, CELL = 3.6, 5.6, 1.02  # [inch] overlays wide, figure tall, one pose wide
+FEW = 8  # modes that are drawn in panels alone, each with its pose
+LEFT, LEAST = 3.6, 5.6  # [inch] width of the overlays, least height
+CELL, FEW_CELL = 1.02, 2.1  # [inch] width of one pose
 BASE = GREY
 SAME: Look = (BLUE, "-")
 OTHER: Look = (VERMILION, "--")
@@ -27,10 +38,11 @@ OTHER: Look = (VERMILION, "--")
 
 @styled
 def modes_figure(modes: AssemblyModes) -> Figure:
-    """Every pose of one set of readings, seen from the front and from above, then each alone.
+    """Draw every pose of one set of readings, each in its own panel.
 
-    Poses whose det J has home's sign are blue, the others vermilion and dashed; they are
-    numbered as `gough modes` lists them.
+    Many poses are also drawn together, from the front and from above; few have their position
+    and angles above. Poses whose det J has home's sign are blue, the others vermilion and
+    dashed; they are numbered as `gough modes` lists them.
 
     Raises:
         GoughError: the modes of several sets of readings; pass modes[i].
@@ -38,31 +50,38 @@ def modes_figure(modes: AssemblyModes) -> Figure:
     if modes.legs.ndim > 1:
         raise GoughError(f"modes: expected one set of readings, found {len(modes)}; pass modes[i]")
     count = len(modes.row)
-    columns = max(1, math.ceil(math.sqrt(1.6 * count)))
+    few = count <= FEW
+    columns = max(1, min(count, FEW // 2) if few else math.ceil(math.sqrt(1.6 * count)))
     rows = max(1, math.ceil(count / columns))
     base = equivalent_struts(modes.platform, modes.legs)[0]
     joints = joint_positions(modes.platform, modes.pose)
     low, high = _frames(_oblique(base), _oblique(joints))
     span = (high - low).max(axis=0, initial=1e-9)
-    wide = CELL * columns
-    tall = (CELL * span[1] / span[0] + 0.16) * rows + 0.7
-    figure = new_figure(LEFT + wide, min(max(LEAST, tall), 2 * (LEFT + wide)))
-    parts: Any = figure.subfigures(1, 2, width_ratios=[LEFT, wide])
-    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)  # pyright: ignore[reportOptionalMemberAccess, reportCallIssue]
-    _draw_together(parts[0], modes, base, joints)
+    wide = (FEW_CELL if few else CELL) * columns
+    tall = (wide / columns * span[1] / span[0] + (0.4 if few else 0.16)) * rows + 0.9
+    left, least = (0.0, 0.0) if few else (LEFT, LEAST)
+    figure = new_figure(max(left + wide, LEFT), min(max(least, tall), 2 * (left + wide) + 1))
+    panels: Any = figure
+    if not few:
+        together, panels = figure.subfigures(1, 2, width_ratios=[LEFT, wide])
+        figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)  # pyright: ignore[reportOptionalMemberAccess, reportCallIssue]
+        _draw_together(together, modes, base, joints)
+        panels.suptitle("each by itself, all to one scale", fontsize=9)
     order = np.argsort(choose_mode(modes).rank)
-    _draw_apart(parts[1], base, joints[order], modes.sign[order], (rows, columns))
+    _draw_apart(panels, modes, base, joints, order, (rows, columns))
+    if few:
+        figure.legend(handles=_marks(), loc="outside lower center", ncols=1 if columns < 3 else 3)
     certified = int(modes.certified.sum())
     plural = "" if count == 1 else "s"
     figure.suptitle(
-        f"{modes.platform.name}: {count} pose{plural} with the same six readings, "
-        f"{certified} proven"
+        f"{modes.platform.name}: {count} pose{plural} with the same six readings,"
+        f"{chr(10) if columns < 3 else ' '}{certified} proven"
     )
     return figure
 
 
 def _draw_together(figure: Any, modes: AssemblyModes, base: Array, joints: Array) -> None:
-    """All poses on top of each other: front view above top view."""
+    """Draw all poses on top of each other: front view above top view."""
     unit = length_unit(modes.platform)
     views = (((0, 2), "all, from the front"), ((0, 1), "all, from above"))
     for axes, ((a, b), name) in zip(figure.subplots(2, 1), views, strict=True):
@@ -74,34 +93,41 @@ def _draw_together(figure: Any, modes: AssemblyModes, base: Array, joints: Array
         axes.plot(*base[:, [a, b]].T, "o", color=BASE, markersize=4)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set(xlabel=f"{'xyz'[a]} [{unit}]", ylabel=f"{'xyz'[b]} [{unit}]", title=name)
-    marks = [
+    figure.legend(handles=_marks(), loc="outside lower center", ncols=2)
+
+
+def _marks() -> list[Line2D]:
+    return [
         Line2D([], [], color=BASE, marker="o", label="base joints"),
         Line2D([], [], color=SAME[0], linestyle=SAME[1], label="plate, det J as at home"),
         Line2D([], [], color=OTHER[0], linestyle=OTHER[1], label="plate, other sign of det J"),
     ]
-    figure.legend(handles=marks, loc="outside lower center", ncols=2)
 
 
 def _draw_apart(
-    figure: Any, base: Array, joints: Array, sign: Array, shape: tuple[int, int]
-) -> None:
-    """Each pose by itself, all to one scale, seen from the front, right and above."""
+    figure: Any, modes: AssemblyModes, base: Array, joints: Array, order: Array,
+    shape: tuple[int, int],
+) -> None:  # fmt: skip
+    """Draw each pose by itself, all to one scale, seen from the front, right and above."""
     plates, ground = _oblique(joints), _oblique(base)
     low, high = _frames(ground, plates)
     middle, half = (low + high) / 2, 0.53 * (high - low).max(axis=0, initial=1e-9)
     panels = np.atleast_1d(figure.subplots(*shape)).ravel()
     for k, axes in enumerate(panels):
         axes.set_axis_off()
-        if k < len(plates):
-            (left, bottom), (right, top) = middle[k] - half, middle[k] + half
-            axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
-            _single(axes, ground, plates[k], base, joints[k], float(sign[k]))
-            axes.text(0.02, 0.99, f"{k + 1}", fontsize=8, va="top", transform=axes.transAxes)
-    figure.suptitle("each by itself, all to one scale", fontsize=9)
+        if k >= len(plates):
+            continue
+        i = int(order[k])
+        (left, bottom), (right, top) = middle[i] - half, middle[i] + half
+        axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+        _single(axes, ground, plates[i], base, joints[i], float(modes.sign[i]))
+        axes.text(0.02, 0.99, f"{k + 1}", fontsize=8, va="top", transform=axes.transAxes)
+        if len(plates) <= FEW:
+            axes.set_title(pose_text(modes.platform, modes.pose[i]), fontsize=7.5)
 
 
 def _frames(ground: Array, plates: Array) -> tuple[Array, Array]:
-    """Lowest and highest corner (M, 2) of base and plate, for each of M poses."""
+    """Lowest and highest corners (M, 2) of base and plate, for each of M poses."""
     below = np.minimum(ground.min(axis=0), plates.min(axis=1))
     above = np.maximum(ground.max(axis=0), plates.max(axis=1))
     return below, above
@@ -128,14 +154,14 @@ def _look(sign: float) -> Look:
 
 
 def _outline(points: Array) -> Array:
-    """Joints (6, 3) around their centre, closed."""
+    """Closed outline (7, 3) through joints (6, 3)."""
     order = outline_order(points)
     return points[np.append(order, order[0])]
 
 
 def _oblique(points: Array) -> Array:
-    """Points (..., 3) seen from the front, right and somewhat above, (..., 2)."""
-    turn, tilt = np.radians(-35), np.radians(22)
-    x = points[..., 0] * np.cos(turn) - points[..., 1] * np.sin(turn)
-    depth = points[..., 0] * np.sin(turn) + points[..., 1] * np.cos(turn)
+    """Project points (..., 3) to (..., 2), seen from the front, right and somewhat above."""
+    pan, tilt = np.radians(-35), np.radians(22)
+    x = points[..., 0] * np.cos(pan) - points[..., 1] * np.sin(pan)
+    depth = points[..., 0] * np.sin(pan) + points[..., 1] * np.cos(pan)
     return np.stack([x, points[..., 2] * np.cos(tilt) + depth * np.sin(tilt)], axis=-1)

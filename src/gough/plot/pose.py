@@ -1,25 +1,28 @@
-"""A pose in 3-D: base, plate, and legs coloured by how much of their stroke they use."""
+"""A pose in 3-D: base, plate, and legs coloured by their position in the stroke."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, to_rgba
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from gough.checks import Array
+from gough.errors import InputError
+from gough.files.trajectory import open_trajectory
 from gough.kinematics import assembly_sign, singularity_distance
 from gough.platform import Platform
-from gough.plot.shapes import Skeleton, outline_order, skeleton
 from gough.plot.style import (
     BLUE,
     FAINT,
@@ -30,12 +33,14 @@ from gough.plot.style import (
     muted,
     new_figure,
     number,
+    pose_text,
     reading_name,
     reading_unit,
     shown_readings,
     styled,
 )
 from gough.pose import Pose
+from gough.skeleton import Skeleton, outline_order, skeleton
 
 STROKE = ("viridis", 0.0, 0.9)  # colour map of the stroke, without its palest part
 PLAIN = "#4F6D8A"  # legs of a platform that states no stroke
@@ -44,16 +49,16 @@ VIEW = (20.0, -62.0)  # [deg] elevation, azimuth
 
 @dataclass(frozen=True)
 class PoseStyle:
-    """How one pose is drawn.
+    """Appearance of one pose.
 
     Attributes:
         plate: colour of the plate.
         line: style of its outline.
         width: of its outline [pt].
         fill: opacity of the plate, 0 for an outline only.
-        legs: colour of the legs; "stroke" for one by stroke, "" to draw none.
-        base: whether base and motor arms are drawn.
-        numbers: whether legs are numbered, at the base.
+        legs: colour of the legs; "stroke" to colour them by stroke, "" to draw none.
+        base: True to draw base and motor arms.
+        numbers: True to number the legs, at the base.
         label: name of the plate in a legend.
     """
 
@@ -83,8 +88,8 @@ def draw_pose(
     machines show motor arms as thick dark lines and rods as legs.
 
     Returns:
-        What was drawn: "legs" (six lines from strut start to platform joint), "plate", and
-        "base" and "arms" where they are.
+        The lines drawn: "legs" (six, from strut start to platform joint), "plate", and "base" and
+        "arms" where drawn.
 
     Raises:
         GoughError: a batch of poses, or a pose of NaN.
@@ -114,7 +119,7 @@ def draw_pose(
 
 @styled
 def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any = 111) -> Axes3D:
-    """3-D axes to scale that hold all of `poses`, with units.
+    """Make 3-D axes to scale that hold all of `poses`, with units.
 
     Args:
         figure: a Figure or SubFigure.
@@ -144,11 +149,13 @@ def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any
 def pose_figure(
     platform: Platform, pose: Pose, *, ghost: Pose | None = None, title: str = ""
 ) -> Figure:
-    """One pose in 3-D, and the readings of its legs within their strokes.
+    """Draw one pose in 3-D, and the readings of its legs within their strokes.
 
     Args:
+        platform: the machine.
+        pose: the pose.
         ghost: a second pose, dashed, such as home or the true pose.
-        title: what stands above; without it the platform's name and the pose.
+        title: text above the picture; without it the platform's name and the pose.
 
     Raises:
         GoughError: a batch of poses, or a pose of NaN.
@@ -157,14 +164,39 @@ def pose_figure(
     figure = new_figure(8.0, 4.5)
     figure.suptitle(title or _title(platform, pose))
     poses = [pose] if ghost is None else [pose, ghost]
-    left, right = figure.add_gridspec(1, 2, width_ratios=[1.7, 1])
+    left, _, right = figure.add_gridspec(1, 3, width_ratios=[1.7, 0.1, 1])
     axes = pose_axes(figure, platform, poses, left)
     draw_pose(axes, platform, pose)
     if ghost is not None:
         draw_pose(axes, platform, ghost, style=GHOST)
     _draw_readings(figure.add_subplot(right), platform, bones)
-    _legend(figure, platform, ghost is not None)
+    _legend(figure, bones, ghost is not None)
     return figure
+
+
+def read_pose(path: str | Path, platform: Platform, row: int, seed: str = "auto") -> Pose:
+    """Read the pose in one row of a file of poses, or solve one row of leg readings.
+
+    Args:
+        path: .csv or .parquet.
+        platform: the machine.
+        row: number of the row, from 1.
+        seed: first guess for leg readings, as for `gough.solve`.
+
+    Raises:
+        InputError: there is no such row, or it has no pose.
+    """
+    seen = 0
+    with open_trajectory(path, platform, seed=seed) as file:
+        for rows in file.blocks():
+            seen += len(rows)
+            chosen = rows[rows[:, 0] == row]
+            if len(chosen):
+                pose = file.solve(chosen).pose[0]
+                if not np.all(np.isfinite(pose.position)):
+                    raise InputError(f"{path}: row {row} has no pose that could be drawn")
+                return pose
+    raise InputError(f"{path}: there is no row {row}: rows are 1 to {seen}")
 
 
 # ---- parts ----------------------------------------------------------------------------
@@ -173,7 +205,7 @@ def pose_figure(
 def _polygon(
     axes: Axes3D, points: Array, color: str, line: str, width: float, fill: float, alpha: float
 ) -> Line2D:
-    """Joints joined around their centre; returns the outline."""
+    """Draw joints joined around their centre; returns the outline."""
     corners = points[outline_order(points)]
     if fill:
         axes.add_collection3d(
@@ -199,12 +231,12 @@ def _legs(axes: Axes3D, bones: Skeleton, style: PoseStyle) -> list[Line2D]:
 
 
 def leg_color(share: float) -> Any:
-    """The colour of a leg that uses this share of its stroke; slate where none is stated."""
+    """Colour of a leg at a position in its stroke, 0 to 1; slate where none is stated."""
     return PLAIN if np.isnan(share) else muted(*STROKE)(share)
 
 
 def _number_legs(axes: Axes3D, base: Array) -> None:
-    """Numbers just outside the base joints; joints that coincide share a place."""
+    """Write numbers just outside the base joints; those of joints at one point side by side."""
     centre = base.mean(axis=0)
     places: dict[tuple[float, ...], list[str]] = {}
     spread = np.abs(base - centre).max()
@@ -218,14 +250,20 @@ def _number_legs(axes: Axes3D, base: Array) -> None:
 
 
 def _draw_readings(axes: Axes, platform: Platform, bones: Skeleton) -> None:
-    """Six horizontal scales: stroke, home and reading of each leg."""
+    """Draw six horizontal scales: stroke, as a colour bar, with home and reading of each leg."""
     readings = shown_readings(platform, bones.readings)
     home = shown_readings(platform, platform.home_legs)
     rows = np.arange(1, 7)
-    axes.plot(home, rows, "|", color=INK, markersize=13, markeredgewidth=1.1)
+    ends = np.concatenate([home, readings[~bones.unreachable]])
     if platform.stroke is not None:
-        low, high = shown_readings(platform, platform.stroke).T
-        axes.barh(rows, high - low, left=low, height=0.34, color="#E3E3E3", zorder=0)
+        limits = shown_readings(platform, platform.stroke)
+        ends = np.append(ends, limits)
+        for row, (low, high) in zip(rows, limits, strict=True):
+            axes.imshow(
+                np.linspace(0, 1, 256)[None], cmap=muted(*STROKE), aspect="auto", alpha=0.6,
+                zorder=1, extent=(low, high, row + 0.16, row - 0.16),
+            )  # fmt: skip
+    axes.plot(home, rows, "|", color=INK, markersize=13, markeredgewidth=1.1)
     for i in range(6):
         if bones.unreachable[i]:
             axes.annotate("cannot reach", (home[i], rows[i]), color=VERMILION, fontsize=8,
@@ -233,13 +271,15 @@ def _draw_readings(axes: Axes, platform: Platform, bones: Skeleton) -> None:
             continue
         wrong = bool(bones.outside[i])
         color = VERMILION if wrong else leg_color(bones.share[i])
-        axes.plot(readings[i], rows[i], "X" if wrong else "o", color=color, markersize=7)
+        axes.plot(readings[i], rows[i], "X" if wrong else "o", color=color, markersize=7,
+                  markeredgecolor=color if wrong else "white")  # fmt: skip
         text = number(readings[i], 100 if platform.legs == "rotary" else _digits(platform))
         axes.annotate(text, (readings[i], rows[i]), xytext=(0, 8), textcoords="offset points",
                       ha="center", fontsize=7.5, color=VERMILION if wrong else INK)  # fmt: skip
-    axes.set(ylim=(6.6, 0.3), yticks=rows, ylabel="leg")
+    margin = 0.14 * (np.ptp(ends) or 0.01 * platform.size)
+    axes.set(xlim=(ends.min() - margin, ends.max() + margin), ylim=(6.6, 0.3), yticks=rows,
+             yticklabels=[f"leg {row}" for row in rows])  # fmt: skip
     axes.set_xlabel(f"{reading_name(platform)} [{reading_unit(platform)}]")
-    axes.margins(x=0.14)
     axes.grid(axis="y", visible=False)
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
@@ -247,33 +287,35 @@ def _draw_readings(axes: Axes, platform: Platform, bones: Skeleton) -> None:
 
 
 def _digits(platform: Platform) -> float:
-    """The size of what readings tell: the stroke of length changes, else the machine."""
+    """Length that sets the digits of readings: the stroke of length changes, else the size."""
     if platform.legs == "length_change" and platform.stroke is not None:
         return float(np.abs(platform.stroke).max())
     return platform.size
 
 
-def _legend(figure: Figure, platform: Platform, ghost: bool) -> None:
-    marks = [Line2D([], [], color=INK, marker="|", linestyle="", markersize=9, label="home")]
-    if platform.stroke is not None:
-        marks += [
-            Line2D([], [], color="#E3E3E3", linewidth=6, label="stroke"),
-            Line2D([], [], color=VERMILION, marker="X", linestyle="--", label="outside stroke"),
-        ]
-        scale = ScalarMappable(Normalize(0, 100), muted(*STROKE))
-        bar = figure.colorbar(scale, ax=figure.axes[1], aspect=30, pad=0.02, location="top",
-                              ticks=[0, 25, 50, 75, 100])  # fmt: skip
-        bar.set_label("stroke used [%]")
-        bar.outline.set_visible(False)
+def _legend(figure: Figure, bones: Skeleton, ghost: bool) -> None:
+    """List the marks that the picture holds."""
+    marks: list[Any] = [
+        Line2D([], [], color=INK, marker="|", linestyle="", markersize=9, label="home")
+    ]
+    if not np.all(np.isnan(bones.share)):
+        ends = [(Patch(color=leg_color(share), alpha=0.6)) for share in (0.0, 0.5, 1.0)]
+        marks.append(tuple(ends))
+    labels = ["home", "stroke, shortest to longest"][: len(marks)]
+    if bones.outside.any():
+        marks.append(Line2D([], [], color=VERMILION, marker="X", linestyle="--"))
+        labels.append("outside stroke")
     if ghost:
-        marks.append(Line2D([], [], color=GHOST.plate, linestyle="--", label="plate at home"))
-    figure.legend(handles=marks, loc="outside lower right", ncols=len(marks))
+        marks.append(Line2D([], [], color=GHOST.plate, linestyle="--"))
+        labels.append("plate at home")
+    figure.legend(
+        marks, labels, loc="outside lower right", ncols=len(marks),
+        handler_map={tuple: HandlerTuple(ndivide=None, pad=0)},
+    )  # fmt: skip
 
 
 def _title(platform: Platform, pose: Pose) -> str:
-    lengths = ", ".join(number(v, platform.size / 10) for v in pose.position)
-    angles = ", ".join(number(v, 10) for v in np.degrees(pose.euler))
-    where = f"({lengths}) {platform.unit}".rstrip() + f", ({angles}) deg"
+    where = pose_text(platform, pose).replace("\n", ", ")
     away = float(singularity_distance(platform, pose))
     if np.isnan(away):
         return f"{platform.name}: {where}\nout of the motors' reach"

@@ -1,7 +1,7 @@
 """One look for all pictures, and how a figure becomes a file.
 
-Colours are those of Okabe and Ito (2008), told apart by all kinds of colour vision; whatever a
-colour says, a line style, a marker or a number says too, so that grey print loses nothing.
+Colours are those of Okabe and Ito (2008), distinct for all kinds of colour vision. A line style, a
+marker or a number repeats what each colour means, so that grey print loses nothing.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.platform import Platform
+from gough.pose import Pose
 from gough.whole_file import check_target, replacing
 
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = (
@@ -67,7 +68,7 @@ _RC: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.formatter.useoffset": False,
     "axes.unicode_minus": True,
-    # a page may be dark: pictures bring their own white
+    # the page around a picture may be dark
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
     "svg.hashsalt": "gough",  # the same picture gives the same bytes
@@ -80,7 +81,7 @@ T = TypeVar("T")
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Within it, figures and axes are made in this look, whatever a matplotlibrc says."""
+    """Context in which figures and axes have this look, whatever a matplotlibrc states."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_RC)
@@ -88,7 +89,7 @@ def house_style() -> Iterator[None]:
 
 
 def styled(make: Callable[P, T]) -> Callable[P, T]:
-    """A function that draws, run within `house_style`."""
+    """Run a drawing function within `house_style`."""
 
     @wraps(make)
     def run(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -100,17 +101,17 @@ def styled(make: Callable[P, T]) -> Callable[P, T]:
 
 @styled
 def new_figure(width: float, height: float) -> Figure:
-    """A figure of that many inches, laid out so that nothing overlaps."""
+    """Make a figure of a width and height [inch], laid out so that nothing overlaps."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure; the file appears whole or not at all.
 
-    The same figure gives the same bytes every time: no dates, no random names inside.
+    The same figure gives the same bytes every time.
 
     Args:
-        path: ends in .svg, .png or .pdf, which picks the format.
+        path: a name ending in .svg, .png or .pdf, which sets the format.
 
     Raises:
         GoughError: another ending, no such folder, a full disk.
@@ -122,10 +123,10 @@ def save(figure: Figure, path: str | Path) -> None:
 
 
 def check_picture(path: str | Path) -> None:
-    """That a picture can be put at `path`, without touching it.
+    """Raise if no picture can be written to `path`; the path is not touched.
 
     Raises:
-        GoughError: an ending that stands for no format, no such folder, a folder or a device.
+        GoughError: an unknown ending, no such folder, or a folder.
     """
     _ending(path)
     check_target(path)
@@ -138,21 +139,21 @@ def _ending(path: str | Path) -> str:
     return ending
 
 
-# ---- words on pictures ----------------------------------------------------------------
+# ---- text on pictures ---------------------------------------------------------------
 
 
 def length_unit(platform: Platform) -> str:
-    """The name of the length unit, or "unit" where the platform names none."""
+    """Name of the length unit, or "unit" where the platform states none."""
     return platform.unit or "unit"
 
 
 def reading_unit(platform: Platform) -> str:
-    """The unit that readings are shown in; motor angles are shown in degrees."""
+    """Unit of readings on pictures, where motor angles are in degrees."""
     return "deg" if platform.legs == "rotary" else length_unit(platform)
 
 
 def reading_name(platform: Platform) -> str:
-    """What a reading is, for an axis."""
+    """Name of a reading, for an axis."""
     names = {"telescopic": "leg length", "length_change": "leg length from home"}
     return names.get(platform.legs, "motor angle")
 
@@ -163,13 +164,20 @@ def shown_readings(platform: Platform, readings: Array) -> Array:
 
 
 def number(value: float, size: float) -> str:
-    """A length to four digits of `size`, without a sign on zero."""
+    """Text of a length, to four digits of `size`, without a sign on zero."""
     places = max(0, 3 - int(np.floor(np.log10(size))))
     return f"{value:z.{places}f}".replace("-", "\N{MINUS SIGN}")
 
 
+def pose_text(platform: Platform, pose: Pose) -> str:
+    """Position and Euler angles of one pose in two lines."""
+    lengths = ", ".join(number(v, platform.size / 10) for v in pose.position)
+    angles = ", ".join(number(v, 10) for v in np.degrees(pose.euler))
+    return f"({lengths}) {platform.unit}".rstrip() + f"\n({angles}) deg"
+
+
 def muted(name: str, low: float, high: float) -> Colormap:
-    """A part of a colour map, by shares of its range: without the ends that print badly."""
+    """Part of a colour map, from `low` to `high` of its range, without ends that print badly."""
     return LinearSegmentedColormap.from_list(
         f"{name}_{low}_{high}", mpl.colormaps[name](np.linspace(low, high, 256))
     )

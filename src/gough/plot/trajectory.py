@@ -1,6 +1,10 @@
-"""Leg readings and pose over the rows of a file."""
+"""Leg readings and pose over the rows of a file of any length."""
 
 from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,8 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from gough.checks import Array
+from gough.errors import InputError
+from gough.files.rows import Reading, Source
+from gough.files.trajectory import Trajectory, TrajectoryFile, open_trajectory
 from gough.platform import Platform
-from gough.plot.envelope import Envelope
 from gough.plot.style import (
     CURVES,
     INK,
@@ -25,12 +31,143 @@ from gough.plot.style import (
 
 SIGNALS = (*(f"leg {i}" for i in range(1, 7)), "x", "y", "z", "rx", "ry", "rz")
 MINUS = "\N{MINUS SIGN}"
-JUMP = 180.0  # [deg] an angle that changes more from row to row has gone round
-FAR = 8.0  # limits farther off than that many times the curves' range would flatten them
+JUMP = 180.0  # [deg] a larger change from row to row is an angle that passes +-180 deg
+FAR = 8.0  # distance of limits / range of the curves, beyond which limits would flatten them
+BINS = 600  # least number; a page is hardly finer
+# a column's name that is or ends in a unit of time: "seconds", "time_ms", "t [s]"
+UNIT = re.compile(
+    r"^(?:(.+?)[ _]*[ _(\[])?(s|sec|seconds|ms|us|ns|min|minutes|h|hours)[\])]?$", re.IGNORECASE
+)
+
+
+class Envelope:
+    """Lowest and highest value of each of K signals over equal runs of rows, in little memory.
+
+    Rows are added in blocks. Few rows have one bin each; where bins run out, neighbours are
+    merged, so that a bin stands for 2, 4, 8, ... rows and no peak is lost.
+
+    Attributes:
+        names: names of the signals.
+        width: rows in a bin.
+        rows: rows added.
+        unanswered: number of them without a usable pose.
+    """
+
+    def __init__(self, names: tuple[str, ...], bins: int = BINS) -> None:
+        self.names, self.width, self.rows, self.unanswered = names, 1, 0, 0
+        self._most = 2 * bins
+        columns = 2 + 2 * len(names)  # first and last x, then lows, then highs
+        self._bins = np.empty((0, columns))
+        self._missing = np.empty(0, dtype=np.int64)
+        self._waiting = self._bins, self._missing
+
+    def add(self, x: Array, values: Array, answered: np.ndarray) -> None:
+        """Add rows.
+
+        Args:
+            x: (n,) on the horizontal axis, rising.
+            values: (n, K), NaN where there is none.
+            answered: (n,) True for rows with a usable pose.
+        """
+        gone = ~answered
+        rows = np.concatenate([x[:, None], x[:, None], values, values], axis=1)
+        self.rows += len(x)
+        self.unanswered += int(gone.sum())
+        rows = np.concatenate([self._waiting[0], rows])
+        missing = np.concatenate([self._waiting[1], gone.astype(np.int64)])
+        while len(rows) >= self.width:
+            room = (self._most - len(self._bins)) * self.width
+            whole = min(room, len(rows) // self.width * self.width)
+            self._append(*self._merge(rows[:whole], missing[:whole], self.width))
+            rows, missing = rows[whole:], missing[whole:]
+            if len(self._bins) == self._most:
+                self._bins, self._missing = self._merge(self._bins, self._missing, 2)
+                self.width *= 2
+        self._waiting = rows, missing
+
+    def _append(self, bins: Array, missing: np.ndarray) -> None:
+        self._bins = np.concatenate([self._bins, bins])
+        self._missing = np.concatenate([self._missing, missing])
+
+    def _merge(self, rows: Array, missing: np.ndarray, width: int) -> tuple[Array, np.ndarray]:
+        k = len(self.names)
+        groups = rows.reshape(-1, width, rows.shape[1])
+        merged = np.concatenate(
+            [
+                groups[:, 0, :1],
+                groups[:, -1, 1:2],
+                np.fmin.reduce(groups[:, :, 2 : 2 + k], axis=1),  # NaN only where all are
+                np.fmax.reduce(groups[:, :, 2 + k :], axis=1),
+            ],
+            axis=1,
+        )
+        return merged, missing.reshape(-1, width).sum(axis=1)
+
+    def _table(self) -> tuple[Array, np.ndarray]:
+        """All bins; the last one may hold fewer rows."""
+        rows, missing = self._waiting
+        if not len(rows):
+            return self._bins, self._missing
+        last, count = self._merge(rows, missing, len(rows))
+        return np.concatenate([self._bins, last]), np.concatenate([self._missing, count])
+
+    @property
+    def x(self) -> Array:
+        """Middle (B,) of each bin."""
+        return self._table()[0][:, :2].mean(axis=1)
+
+    @property
+    def low(self) -> Array:
+        """Lowest values (B, K) of each bin."""
+        return self._table()[0][:, 2 : 2 + len(self.names)]
+
+    @property
+    def high(self) -> Array:
+        """Highest values (B, K) of each bin."""
+        return self._table()[0][:, 2 + len(self.names) :]
+
+    @property
+    def missing(self) -> np.ndarray:
+        """Number (B,) of rows without a usable pose in each bin."""
+        return self._table()[1]
+
+
+def read_trajectory(
+    path: str | Path,
+    platform: Platform,
+    *,
+    time: str | None = None,
+    seed: str = "auto",
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+    tick: Callable[[Source], None] | None = None,
+) -> Envelope:
+    """Read a file of poses or of leg readings into an envelope for `trajectory_figure`.
+
+    Of rows without a usable pose, only readings that stand in the file are kept.
+
+    Args:
+        path: .csv or .parquet; a file that has the columns of a pose is read as poses.
+        platform: the machine.
+        time: the column on the horizontal axis; without it rows are counted from 1.
+        seed: first guess for leg readings, as for `gough.solve`.
+        reading: options for reading the file.
+        tick: called after every block.
+
+    Raises:
+        GoughError, InputError: an error in the file, with its row or line.
+    """
+    envelope = Envelope(SIGNALS)
+    with open_trajectory(path, platform, time=time, seed=seed, reading=reading) as file:
+        for rows in file.blocks(tick):
+            found = file.solve(rows)
+            values = signals(platform, found.legs, found.pose.position, found.pose.euler)
+            values[~found.usable, 0 if file.has_poses else 6 :] = np.nan
+            envelope.add(_times(file, found), values, found.usable)
+    return envelope
 
 
 def signals(platform: Platform, readings: Array, position: Array, euler: Array) -> Array:
-    """What `trajectory_figure` draws, (n, 12): readings as shown, position, angles [deg].
+    """Values (n, 12) that `trajectory_figure` draws: readings as shown, position, angles [deg].
 
     Args:
         readings: (n, 6), as `gough.leg_lengths` gives them.
@@ -46,12 +183,14 @@ def trajectory_figure(
 ) -> Figure:
     """Leg readings, position and angles over time.
 
-    Stroke limits are thick grey lines. Rows without a usable answer leave a gap and a cross below.
+    Stroke limits are thick grey lines. Rows without a usable pose leave a gap and a cross below.
 
     Args:
+        platform: the machine.
         envelope: of the twelve `signals`, named `SIGNALS`.
-        time: what the horizontal axis is.
-        title: what stands above; without it the platform's name.
+        time: name of the column on the horizontal axis, or "row". Its unit is taken from the
+            name, as in "time_ms" or "t [min]"; without one, times are in seconds.
+        title: text above the panels; without it the platform's name.
     """
     figure = new_figure(7.6, 7.4)
     panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.5, 1, 1])
@@ -59,7 +198,10 @@ def trajectory_figure(
     _position(panels[1], platform, envelope)
     _curves(panels[2], envelope, range(9, 12), SIGNALS[9:], wrap=True)
     panels[2].set_ylabel("angle [deg]\nR = Rx Ry Rz")
-    panels[2].set_xlabel(time)
+    label = _time_label(time)
+    panels[2].set_xlabel(label)
+    if time == "row":
+        panels[2].xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in panels:
         axes.yaxis.set_major_locator(MaxNLocator(6))
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handlelength=2.6)
@@ -69,13 +211,23 @@ def trajectory_figure(
     said = note(envelope)
     if said:
         figure.text(0.99, 0.0, said, fontsize=7.5, ha="right", va="bottom", in_layout=True)
-        panels[2].set_xlabel(time, labelpad=6)
+        panels[2].set_xlabel(label, labelpad=6)
         figure.get_layout_engine().set(rect=(0, 0.025, 1, 0.975))  # pyright: ignore[reportOptionalMemberAccess, reportCallIssue]
     return figure
 
 
+def _time_label(name: str) -> str:
+    """Label of the horizontal axis, with the unit in brackets."""
+    if name == "row":
+        return name
+    found = UNIT.match(name)
+    if found is None:
+        return f"{name} [s]"
+    return f"{found[1]} [{found[2]}]" if found[1] else name
+
+
 def note(envelope: Envelope) -> str:
-    """What a reader must know of how the picture was made."""
+    """Note on rows without a pose, and on the number of rows at each point; may be empty."""
     parts = []
     if envelope.width > 1:
         parts.append(
@@ -84,7 +236,7 @@ def note(envelope: Envelope) -> str:
     if envelope.unanswered:
         plural = "s" if envelope.unanswered > 1 else ""
         parts.append(f"\N{MULTIPLICATION SIGN} {envelope.unanswered:,} row{plural} without a "
-                     "usable answer")  # fmt: skip
+                     "usable pose")  # fmt: skip
     return "; ".join(parts)
 
 
@@ -115,7 +267,7 @@ def _legs(axes: Axes, platform: Platform, envelope: Envelope) -> None:
 
 
 def _position(axes: Axes, platform: Platform, envelope: Envelope) -> None:
-    """Position from home, for else the height of the machine would flatten all else."""
+    """Position from home; the height of the machine would flatten the other curves."""
     home = platform.home.position
     names = []
     for name, value in zip("xyz", home, strict=True):
@@ -127,7 +279,7 @@ def _position(axes: Axes, platform: Platform, envelope: Envelope) -> None:
 
 
 def _curves(axes: Axes, envelope: Envelope, which, names, *, offsets=None, wrap=False) -> None:
-    """One line for each signal, or a band where a point stands for many rows."""
+    """Draw a line for each signal, or a band where a point stands for many rows."""
     x = envelope.x
     low, high = envelope.low[:, which], envelope.high[:, which]
     if offsets is not None:
@@ -143,8 +295,20 @@ def _curves(axes: Axes, envelope: Envelope, which, names, *, offsets=None, wrap=
 
 
 def _gaps(axes: Axes, envelope: Envelope) -> None:
-    """A cross at the bottom for every bin that holds rows without a usable answer."""
+    """Draw a cross at the bottom for every bin with rows that have no usable pose."""
     x = envelope.x[envelope.missing > 0]
     if len(x):
         axes.plot(x, np.full(len(x), 0.03), "x", color=VERMILION, markersize=5, label="_gap",
                   transform=axes.get_xaxis_transform(), clip_on=False)  # fmt: skip
+
+
+def _times(file: TrajectoryFile, rows: Trajectory) -> Array:
+    """Horizontal axis (n,): a column, with gaps interpolated, or the numbers of the rows."""
+    if file.time is None:
+        return rows.number.astype(np.float64)
+    known = np.isfinite(rows.time)
+    if not np.any(known):
+        raise InputError(
+            f"{file.source.where}: row {rows.number[0]} and on: column {file.time} holds no numbers"
+        )
+    return np.interp(rows.number, rows.number[known], rows.time[known])

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from gough.checks import Array
@@ -31,10 +32,12 @@ from gough.plot.style import (
 )
 from gough.pose import Pose
 
+NEAR_ZERO = 0.25  # colours begin at 0 where the least distance / largest is below this
+RIM = "#22222266"  # around lines on colours
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 WIDEST = {"rx": 180.0, "ry": 90.0, "rz": 180.0}  # [deg] what Euler angles tell apart
-RESOLUTION = 181  # poses along each axis
-BEYOND = 1.25  # how far a slice reaches beyond workspace and stroke
+RESOLUTION = 361  # poses along each axis
+BEYOND = 1.25  # span of a slice / span of workspace and stroke
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +51,8 @@ class WorkspaceSlice:
         fixed: the values of the other four, same units.
         distance: (m, n) distance to the nearest singularity; NaN where motors cannot reach.
         signed: (m, n) the same, negative where det J has not home's sign.
-        margin: (m, n, 6) how far each reading is from the nearer end of its stroke, as a share
-            of it, negative outside; NaN where no stroke is stated or motors cannot reach.
+        margin: (m, n, 6) `stroke_margin`, negative outside; NaN where no stroke is stated or
+            motors cannot reach.
     """
 
     platform: Platform
@@ -75,7 +78,7 @@ def workspace_slice(
     span: tuple[float, float, float, float] | None = None,
     resolution: int = RESOLUTION,
 ) -> WorkspaceSlice:
-    """Distance to singularity and margin to the stroke over a grid of poses.
+    """Calculate distance to singularity and margin to the stroke over a grid of poses.
 
     Args:
         axes: two of x, y, z, rx, ry, rz; angles are those of R = Rx Ry Rz.
@@ -105,7 +108,7 @@ def workspace_slice(
 
 
 def stroke_margin(platform: Platform, pose: Pose) -> Array:
-    """How far each reading is from the nearer end of its stroke, as a share of it, (..., 6)."""
+    """Distance (..., 6) of readings to the nearer end of their stroke / stroke."""
     readings = leg_lengths(platform, pose)
     if platform.stroke is None:
         return np.full(readings.shape, np.nan)
@@ -115,7 +118,7 @@ def stroke_margin(platform: Platform, pose: Pose) -> Array:
 
 @styled
 def workspace_figure(cut: WorkspaceSlice) -> Figure:
-    """A slice as a picture of its own, with colour bar and legend."""
+    """Draw a slice, with colour bar and legend."""
     figure = new_figure(6.8, 5.6)
     axes = figure.add_subplot()
     image = draw_slice(axes, cut)
@@ -128,19 +131,24 @@ def workspace_figure(cut: WorkspaceSlice) -> Figure:
 
 
 def draw_slice(axes: Axes, cut: WorkspaceSlice) -> Any:
-    """Draw a slice into axes of your own; returns the image, for a colour bar.
+    """Draw a slice into given axes; returns the image, for a colour bar.
 
-    Dark is singular. Thin lines join poses of equal distance; the singularity curve, where det
-    J changes its sign, is vermilion and dashed; the edge of the stroke is a thick dark line
-    with everything outside hatched; each leg's own limits are thin dotted lines. What the
-    motors of a rotary machine cannot reach is grey.
+    Darker is closer to a singularity; the colours span the distances within the stroke. Thin
+    lines join poses of equal distance. The singularity curve, where det J changes its sign, is
+    vermilion and dashed. The edge of the stroke is a thick dark line, with everything outside
+    hatched; the limits of single legs are thin dotted lines. Poses that the motors
+    of a rotary machine cannot reach are grey.
     """
     half = [(values[1] - values[0]) / 2 for values in (cut.u, cut.v)]
     extent = (cut.u[0] - half[0], cut.u[-1] + half[0], cut.v[0] - half[1], cut.v[-1] + half[1])
     scale = muted("cividis", 0.0, 0.95).with_extremes(bad=FAINT)
+    inside = _inside(cut)
+    lowest = max(0.0, np.nanmin(inside, initial=np.inf)) if np.any(np.isfinite(inside)) else 0.0
+    highest = np.nanmax(inside, initial=lowest)
+    lowest = 0.0 if lowest < NEAR_ZERO * highest else lowest
     image = axes.imshow(
         np.ma.masked_invalid(cut.distance), origin="lower", extent=extent, aspect="auto",
-        cmap=scale, vmin=0.0, interpolation="nearest",
+        cmap=scale, vmin=lowest, vmax=highest, interpolation="nearest",
     )  # fmt: skip
     _equal_distance(axes, cut)
     _stroke(axes, cut)
@@ -154,16 +162,25 @@ def draw_slice(axes: Axes, cut: WorkspaceSlice) -> Any:
     return image
 
 
-# ---- what is drawn --------------------------------------------------------------------
+# ---- drawing -------------------------------------------------------------------------
+
+
+def _inside(cut: WorkspaceSlice) -> Array:
+    """Distances (m, n) of the slice, NaN outside the stroke."""
+    outside = np.any(cut.margin < 0, axis=-1)
+    return np.where(outside, np.nan, cut.distance)
 
 
 def _equal_distance(axes: Axes, cut: WorkspaceSlice) -> None:
-    if np.nanmax(cut.distance, initial=0) > np.nanmin(cut.distance, initial=0):
+    """Draw lines of equal distance within the stroke, with labels that read on any colour."""
+    inside = _inside(cut)
+    if np.nanmax(inside, initial=0) > np.nanmin(inside, initial=0):
         lines = axes.contour(
-            cut.u, cut.v, np.ma.masked_invalid(cut.distance), levels=6, colors="white",
-            linewidths=0.6, alpha=0.85,
-        )  # fmt: skip
-        axes.clabel(lines, fontsize=7, fmt="%.3g")
+            cut.u, cut.v, np.ma.masked_invalid(inside), levels=6, colors="white", linewidths=0.8
+        )
+        lines.set_path_effects([withStroke(linewidth=1.8, foreground=RIM)])
+        for label in axes.clabel(lines, fontsize=8, fmt="%.3g", colors="white"):
+            label.set_path_effects([withStroke(linewidth=1.4, foreground=INK)])
 
 
 def _stroke(axes: Axes, cut: WorkspaceSlice) -> None:
@@ -184,13 +201,13 @@ def _singularity(axes: Axes, cut: WorkspaceSlice) -> None:
 
 
 def _zero(axes: Axes, cut: WorkspaceSlice, values: Array, **look: Any) -> None:
-    """The line where values change their sign, if they do."""
+    """Draw the line where values change their sign, if they do."""
     if np.nanmin(values, initial=0) < 0 < np.nanmax(values, initial=0):
         axes.contour(cut.u, cut.v, np.ma.masked_invalid(values), levels=[0.0], **look)
 
 
 def _box(axes: Axes, cut: WorkspaceSlice) -> None:
-    """The stated workspace, where this slice goes through home."""
+    """Draw the stated workspace."""
     box = _workspace_box(cut.platform)
     if box is None:
         return
@@ -237,7 +254,7 @@ def _fixed_text(cut: WorkspaceSlice) -> str:
     return "; ".join(parts)
 
 
-# ---- where ----------------------------------------------------------------------------
+# ---- ranges ---------------------------------------------------------------------------
 
 
 def _is_angle(name: str) -> bool:
@@ -278,8 +295,10 @@ def _checked(name: str, low: float, high: float) -> tuple[float, float]:
 
 
 def _workspace_box(platform: Platform) -> dict[str, tuple[float, float]] | None:
-    """Lowest and highest value of each coordinate; None where none is stated or home is
-    turned, for then a box about home is none in these coordinates.
+    """Lowest and highest value of each coordinate.
+
+    None where none is stated, or where home is rotated: the box about home is then not a box
+    in these coordinates.
     """
     box, home = platform.workspace, _home(platform)
     if box is None or any(abs(home[name]) > 1e-9 for name in ("rx", "ry", "rz")):
@@ -292,7 +311,7 @@ def _workspace_box(platform: Platform) -> dict[str, tuple[float, float]] | None:
 
 
 def _span(platform: Platform, fixed: dict[str, float], name: str) -> tuple[float, float]:
-    """From `fixed` as far as workspace or stroke go along one axis, and a little more."""
+    """Range of one axis: workspace or stroke through `fixed`, and a little more."""
     middle = fixed[name]
     widest = WIDEST.get(name, platform.size)
     reach = [0.35 * widest] * 2 if not _is_angle(name) else [60.0] * 2
@@ -310,7 +329,7 @@ def _span(platform: Platform, fixed: dict[str, float], name: str) -> tuple[float
 
 
 def _first_outside(platform: Platform, fixed: dict[str, float], name: str, values: Array) -> int:
-    """How many steps along `values` all readings are within their stroke; 1 at least."""
+    """Number of steps along `values` with all readings within their stroke; 1 at least."""
     margin = stroke_margin(platform, _poses({**fixed, name: values})).min(axis=-1)
     outside = np.flatnonzero(~(margin >= 0))
     return max(1, int(outside[0])) if len(outside) else len(values) - 1

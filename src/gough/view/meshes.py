@@ -1,4 +1,4 @@
-"""What is drawn, as numbers: meshes, and where the parts of a leg are. Knows no browser."""
+"""What is drawn, as numbers: meshes, the parts of a leg, colours. Independent of the browser."""
 
 from __future__ import annotations
 
@@ -9,13 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.kinematics import equivalent_struts, joint_positions
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.skeleton import outline_order, outside_stroke, skeleton, stroke_share
 
-BARREL = 0.55  # length of a telescopic leg's outer tube, as a share of the leg at home
-INSIDE = 0.8  # or of the leg as it is, if that is less
-LABEL_GAP = 0.09  # labels are at least so far apart, and from their joints [drawn]
+# Colours that all kinds of colour vision tell apart (Okabe and Ito).
+BLUE, GREEN, YELLOW, VERMILION = "#0072B2", "#009E73", "#F0E442", "#D55E00"
+ORANGE, GREY = "#E69F00", "#7A8590"
+BASE, PLATE = "#A7B0B8", "#5B6B7B"
+RAMP = (BLUE, GREEN, YELLOW)  # lowest, middle and highest reading of a stroke
+OUT = "#D1001C"  # outside the stroke: red, and darker than any colour of the ramp
+SAME, OTHER = BLUE, VERMILION  # det J with home's sign, or with the other; as `gough plot modes`
+
+TUBE = 0.55  # length of a telescopic leg's outer tube / length of the leg at home
+LONGEST_TUBE = 0.8  # the same / present length of the leg
+LABEL_GAP = 0.09  # smallest distance between labels, and from their joints / size
 
 
 class Mesh(NamedTuple):
@@ -27,7 +35,7 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True)
 class Frame:
-    """From a machine's own coordinates to drawn ones, in which its size is 1.
+    """Map between base coordinates and drawn coordinates, in which the machine's size is 1.
 
     Cameras, line widths and handles then need no care for units or far-off origins.
     """
@@ -37,23 +45,23 @@ class Frame:
 
     @classmethod
     def of(cls, platform: Platform) -> Frame:
-        """The frame whose origin is the centre of the base joints."""
+        """Frame whose origin is the centre of the base joints."""
         return cls(platform.base.mean(axis=0), platform.size)
 
     def drawn(self, points: Array) -> Array:
-        """Base coordinates (..., 3) [platform unit] as drawn."""
+        """Drawn coordinates of points (..., 3) in base coordinates [platform unit]."""
         return (points - self.centre) / self.size
 
-    def told(self, points: Array) -> Array:
-        """Drawn points (..., 3) in base coordinates [platform unit]."""
+    def from_drawn(self, points: Array) -> Array:
+        """Base coordinates [platform unit] of drawn points (..., 3)."""
         return points * self.size + self.centre
 
 
 class Limbs(NamedTuple):
     """The thick and the thin part of each leg, both from start to end, (6, 3) each.
 
-    Telescopic: an outer tube on the base, and the rod that comes out of it. Rotary: motor arm,
-    and the rod between its tip and the platform.
+    Telescopic: an outer tube on the base, and the rod that slides in it. Rotary: motor arm, and
+    the rod between its tip and the platform.
     """
 
     thick_start: Array
@@ -63,30 +71,41 @@ class Limbs(NamedTuple):
 
 
 def limbs(platform: Platform, pose: Pose, legs: Array) -> Limbs:
-    """Where the parts of the legs are in base coordinates, to scale.
-
-    Args:
-        legs: the readings (6,) at the pose. They say where motor arms stand, which the pose
-            alone does not for a mode on the motors' other branch.
-    """
-    joints = joint_positions(platform, pose)
-    tips, _ = equivalent_struts(platform, legs)
+    """Parts of the legs at a pose with readings (6,), in base coordinates [platform unit]."""
+    points = skeleton(platform, pose, legs)
     if platform.rotary is not None:
-        return Limbs(platform.base, tips, tips, joints)
-    struts = joints - tips
+        return Limbs(points.base, points.tips, points.tips, points.plate)
+    struts = points.plate - points.tips
     length = np.linalg.norm(struts, axis=-1)
     with np.errstate(divide="ignore"):
-        share = np.minimum(BARREL * platform.home_lengths / length, INSIDE)
-    return Limbs(tips, tips + share[:, None] * struts, tips, joints)
+        share = np.minimum(TUBE * platform.home_lengths / length, LONGEST_TUBE)
+    return Limbs(points.tips, points.tips + share[:, None] * struts, points.tips, points.plate)
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Red, green and blue, 0 to 255, of "#rrggbb"."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+def leg_colors(platform: Platform, legs: Array) -> NDArray[np.uint8]:
+    """Colours (6, 3) of legs by their position in the stroke; grey where none is stated."""
+    if platform.stroke is None:
+        return np.tile(np.array(rgb(GREY), np.uint8), (6, 1))
+    share = np.clip(stroke_share(platform, legs), 0, 1)
+    stops = np.array([rgb(color) for color in RAMP], float)
+    where = np.linspace(0, 1, len(RAMP))
+    colors = np.stack([np.interp(share, where, channel) for channel in stops.T], axis=-1)
+    colors[outside_stroke(platform, legs)] = rgb(OUT)
+    return np.round(colors).astype(np.uint8)
 
 
 def rods_between(starts: Array, ends: Array, radius: float) -> tuple[Array, Array, Array]:
-    """Positions (N, 3), quaternions (N, 4) and scales (N, 3) that put unit cylinders there."""
+    """Positions (N, 3), quaternions (N, 4) and scales (N, 3) of unit cylinders as rods (N, 3)."""
     along = ends - starts
     length = np.linalg.norm(along, axis=-1)
     with np.errstate(invalid="ignore"):
         x, y, z = np.where(length[:, None] > 0, along / length[:, None], [0.0, 0.0, 1.0]).T
-    # the half-way quaternion from +z; straight down it is undefined, and a turn about x serves
+    # the shortest rotation from +z; straight down, where it is undefined, half a turn about x
     wxyz = np.stack([1 + z, -y, x, np.zeros_like(z)], axis=-1)
     wxyz[1 + z < 1e-12] = [0, 1, 0, 0]
     wxyz /= np.linalg.norm(wxyz, axis=-1, keepdims=True)
@@ -95,7 +114,7 @@ def rods_between(starts: Array, ends: Array, radius: float) -> tuple[Array, Arra
 
 
 def cylinder(sides: int = 20) -> Mesh:
-    """Radius 1 about the z axis, from z = 0 to 1; caps have corners of their own, for shading."""
+    """Cylinder of radius 1 about the z axis, z = 0 to 1; caps share no corners, for shading."""
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=-1)
     up = np.array([0.0, 0.0, 1.0])
@@ -111,7 +130,7 @@ def cylinder(sides: int = 20) -> Mesh:
 
 
 def sphere(rings: int = 10, sides: int = 16) -> Mesh:
-    """Radius 1 about the origin."""
+    """Sphere of radius 1 about the origin."""
     tilt = np.linspace(0, np.pi, rings + 1)[:, None]
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     shape = np.broadcast_shapes(tilt.shape, turn.shape)
@@ -124,17 +143,14 @@ def sphere(rings: int = 10, sides: int = 16) -> Mesh:
 
 
 def plate(joints: Array, thickness: float, margin: float = 1.1) -> Mesh:
-    """A slab whose upper side holds six joints (6, 3), a little wider than they are.
-
-    The joints are taken in the order in which they stand around their centre, and need not lie
-    in a plane; the plate then is a tent over them.
-    """
+    """Slab under six joints (6, 3), `margin` times as wide; a tent if they lie in no plane."""
     centre = joints.mean(axis=0)
-    right, _, normal = np.linalg.svd(joints - centre)[2]
+    normal = np.linalg.svd(joints - centre)[2][2]
     normal = -normal if normal[2] < 0 else normal
-    up = np.cross(normal, right)
-    order = np.argsort(np.arctan2((joints - centre) @ up, (joints - centre) @ right))
-    rim = centre + margin * (joints[order] - centre)
+    rim = joints[outline_order(joints)]
+    if np.sum(np.cross(rim - centre, np.roll(rim, -1, axis=0) - centre) @ normal) < 0:
+        rim = rim[::-1]  # counterclockwise from above, so that faces look outward
+    rim = centre + margin * (rim - centre)
     down = -thickness * normal
     top = np.concatenate([rim, [centre]])
     edge = np.concatenate([rim, rim + down])
@@ -150,7 +166,7 @@ def plate(joints: Array, thickness: float, margin: float = 1.1) -> Mesh:
 
 
 def label_places(joints: Array) -> Array:
-    """Where labels of drawn joints (6, 3) stand: outside of them, and apart from each other."""
+    """Places (6, 3) for labels of drawn joints (6, 3): outside them, and apart from each other."""
     centre = joints.mean(axis=0)
     outward = joints - centre
     outward[:, 2] = 0.0
@@ -162,7 +178,7 @@ def label_places(joints: Array) -> Array:
         if distance.min() >= LABEL_GAP:
             break
         push = np.clip(LABEL_GAP - distance, 0, None)[..., None] / 2
-        # joints at one point have no direction apart: take that of their legs' numbers
+        # joints at one point: separate their labels in the order of the legs
         spread = np.subtract.outer(np.arange(6.0), np.arange(6.0))[..., None] * [1.0, 0.5, 0.0]
         where = np.where(distance[..., None] > 1e-9, apart, spread)
         length = np.linalg.norm(where, axis=-1, keepdims=True)
@@ -171,6 +187,6 @@ def label_places(joints: Array) -> Array:
 
 
 def round_number(value: float) -> float:
-    """The largest of 1, 2, 5, 10, 20, ... (and 0.5, 0.2, ...) that is not above a number."""
+    """Largest of ..., 0.2, 0.5, 1, 2, 5, 10, ... that does not exceed a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(m * power for m in (1, 2, 5) if m * power <= value * (1 + 1e-9)))

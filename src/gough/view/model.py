@@ -1,38 +1,41 @@
-"""The state behind the page: the pose in the picture, what was asked for, and what is known.
+"""State of the page: the pose in the picture, the last request, and its result.
 
-It changes in four ways: by leg readings, by a pose, by a mode picked from a list, by a row of a
-file. Whatever is asked for and cannot be reached leaves the pose in the picture as it is.
+A request gives readings, a pose, an assembly mode or a row of a file. One that no pose or no
+readings answer leaves the pose in the picture unchanged. A pose beyond its limits is shown, and
+the result names the limits.
 """
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from gough.checks import Array
 from gough.kinematics import leg_lengths, singularity_distance, strut_vectors
-from gough.limit_rules import pose_status
+from gough.limit_rules import in_workspace
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.status import InverseStatus
-from gough.view import colors
+from gough.skeleton import outside_stroke
 from gough.view.follow import follow
 
-STAYS = "The picture stays where it was."
-NO_LENGTH = 1e-9  # a strut shorter than this share of the size points nowhere
+UNCHANGED = "The picture is unchanged; Undo resets the sliders."
+SHORTEST_STRUT = 1e-9  # / size; below it a strut has no direction
+CLOSE = 0.2  # singularity distance / that of home; less deserves a warning
+UNDO_STEPS = 100
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of the last thing that was asked for.
+    """Result of the last request.
 
     Attributes:
-        reached: the picture shows it.
-        text: the status sentence.
+        reached: True if the picture shows what was requested.
+        text: a sentence: the limits that the pose keeps or exceeds, or why there is no pose.
         how: what was computed: "forward kinematics", "inverse kinematics", "home", ...
-        residual: largest strut length error [platform unit]; of a miss, the nearest one's.
+        residual: largest strut length error [platform unit], of the pose or of the closest one.
         iterations: Newton steps.
         seconds: time taken.
     """
@@ -46,28 +49,27 @@ class Answer:
 
 
 class Model:
-    """One machine on the screen.
+    """One machine on the page.
 
     Attributes:
-        pose, legs: what the picture shows, and its readings (6,).
-        numbers: (6,) the pose that was asked for last: position [platform unit], then Euler
-            angles [deg], R = Rx Ry Rz. Those of `pose` wherever that was reached.
-        asked: (6,) readings that were asked for last; `legs` wherever they were reached.
-        answer: what is known about it.
+        pose, legs: the pose in the picture, and its readings (6,).
+        numbers: (6,) position [platform unit] and Euler angles [deg], R = Rx Ry Rz, of the last
+            request; those of `pose` unless it was not reached.
+        asked: (6,) readings of the last request; `legs` unless they were not reached.
+        answer: its result.
     """
 
     def __init__(self, platform: Platform) -> None:
         self.platform = platform
         self._home_distance = float(singularity_distance(platform, platform.home))
-        self.pose, self.legs = platform.home, platform.home_legs
+        self._earlier: deque[tuple[Pose, Array, Array]] = deque(maxlen=UNDO_STEPS)
         self.home()
 
-    # ---- asked for by a person --------------------------------------------------------
+    # ---- requests ---------------------------------------------------------------------
 
     def home(self) -> None:
-        """Back to the platform's home pose."""
-        self._take(self.platform.home, self.platform.home_legs)
-        self.answer = Answer(True, self._placed(self.pose, self.legs), "home")
+        """Go to the platform's home pose."""
+        self._show(self.platform.home, self.platform.home_legs, "home")
 
     def ask_legs(self, readings: dict[int, float]) -> None:
         """Set some readings, by leg (0 to 5); the pose follows in its assembly mode."""
@@ -75,21 +77,18 @@ class Model:
         target[list(readings)] = list(readings.values())
         found = follow(self.platform, self.pose, self.legs, target)
         known = (found.residual, found.iterations, found.seconds)
-        reached = found.pose is not None
-        text = found.text if reached else f"{found.text} {STAYS}"
-        self.answer = Answer(reached, text, "forward kinematics", *known)
         if found.pose is not None:
-            self._take(found.pose, target)
-        else:
-            self.asked, self.numbers = target, pose_numbers(self.pose)
+            self._show(found.pose, target, "forward kinematics", *known)
+            return
+        self.answer = Answer(False, f"{found.text} {UNCHANGED}", "forward kinematics", *known)
+        self.asked, self.numbers = target, pose_numbers(self.pose)
 
     def ask_numbers(self, values: dict[int, float]) -> None:
         """Set some of x, y, z [platform unit] and rx, ry, rz [deg] (0 to 5); legs follow."""
         numbers = self.numbers.copy()
         numbers[list(values)] = list(values.values())
-        pose = Pose.from_euler(numbers[:3], np.radians(numbers[3:]))
-        self.ask_pose(pose)
-        # as asked: angles read back from the pose may be others of the same rotation
+        self.ask_pose(Pose.from_euler(numbers[:3], np.radians(numbers[3:])))
+        # as requested: angles read back from the pose may be others of the same rotation
         self.numbers = numbers
 
     def ask_pose(self, pose: Pose) -> None:
@@ -98,34 +97,46 @@ class Model:
         with np.errstate(invalid="ignore"):
             legs = leg_lengths(self.platform, pose)
         seconds = time.perf_counter() - begin
-        trouble = self._trouble(pose, legs)
-        if trouble:
-            self.answer = Answer(False, f"{trouble} {STAYS}", "inverse kinematics", seconds=seconds)
-            self.numbers, self.asked = pose_numbers(pose), self.legs
+        problem = _problem(self.platform, pose, legs)
+        if not problem:
+            self._show(pose, legs, "inverse kinematics", seconds=seconds)
             return
-        self._take(pose, legs)
-        text = self._placed(pose, legs)
-        self.answer = Answer(True, text, "inverse kinematics", seconds=seconds)
+        self.answer = Answer(False, f"{problem} {UNCHANGED}", "inverse kinematics", seconds=seconds)
+        self.numbers, self.asked = pose_numbers(pose), self.legs.copy()
 
-    def pick(self, pose: Pose, residual: float, name: str) -> None:
-        """Take another assembly mode of the present readings."""
-        self._take(pose, self.legs)
-        text = "This pose has the same leg readings as before."
-        self.answer = Answer(True, text, name, residual)
+    def pick(self, pose: Pose, residual: float) -> None:
+        """Take another assembly mode with the present readings."""
+        self._show(pose, self.legs, "assembly mode", residual)
 
     def show(self, pose: Pose, legs: Array, answer: Answer) -> None:
-        """Take a row of a file with what is known about it; a row without a pose moves nothing."""
+        """Take a row of a file with its result; one without a pose leaves the picture as it is."""
         if answer.reached:
             self._take(pose, legs)
         else:
-            self.forget()
+            self.reset_sliders()
         self.answer = answer
 
-    def forget(self) -> None:
-        """Drop what was asked for and not reached: all numbers are the picture's again."""
-        self._take(self.pose, self.legs)
+    def remember(self) -> None:
+        """Keep the present pose for `undo`."""
+        self._earlier.append((self.pose, self.legs, self.numbers))
 
-    # ---- seen -------------------------------------------------------------------------
+    def undo(self) -> None:
+        """Drop a request that was not reached, or go back to the pose before the last move."""
+        if not self.answer.reached:
+            self.reset_sliders()
+            return
+        while self._earlier:
+            pose, legs, numbers = self._earlier.pop()
+            if pose is not self.pose:
+                self._show(pose, legs, "undone")
+                self.numbers = numbers
+                return
+
+    def reset_sliders(self) -> None:
+        """Set all sliders to the pose in the picture."""
+        self._show(self.pose, self.legs, "present pose")
+
+    # ---- state ------------------------------------------------------------------------
 
     @property
     def singularity(self) -> float:
@@ -134,36 +145,83 @@ class Model:
 
     @property
     def singularity_share(self) -> float:
-        """The same as a share of that at home; may be NaN."""
-        return self.singularity / self._home_distance
+        """`singularity` / that of home; NaN where either is unknown, or home is singular."""
+        return self.singularity / self._home_distance if self._home_distance else np.nan
 
     @property
-    def out_of_stroke(self) -> bool:
-        """Whether a leg is beyond its limits."""
-        return bool(colors.out_of_stroke(self.platform, self.legs).any())
+    def within_limits(self) -> bool:
+        """True if the pose in the picture keeps the stated stroke and workspace."""
+        inside = bool(in_workspace(self.platform, self.pose))
+        return inside and not outside_stroke(self.platform, self.legs).any()
 
-    # ---- inside -----------------------------------------------------------------------
+    # ---- parts ------------------------------------------------------------------------
+
+    def _show(
+        self, pose: Pose, legs: Array, how: str, residual=0.0, iterations=0, seconds=0.0
+    ) -> None:
+        self._take(pose, legs)
+        text = limits_text(self.platform, pose, legs)
+        if self.singularity_share < CLOSE:
+            text += " Close to a singularity: small reading errors become large pose errors."
+        self.answer = Answer(True, text, how, residual, iterations, seconds)
 
     def _take(self, pose: Pose, legs: Array) -> None:
         self.pose, self.legs = pose, legs
         self.numbers, self.asked = pose_numbers(pose), legs.copy()
 
-    def _placed(self, pose: Pose, legs: Array) -> str:
-        return InverseStatus(int(pose_status(self.platform, pose, legs))).text
-
-    def _trouble(self, pose: Pose, legs: Array) -> str | None:
-        """Why a pose cannot be shown; None if it can."""
-        stuck = np.flatnonzero(~np.isfinite(legs))
-        if len(stuck):
-            which = ", ".join(str(i + 1) for i in stuck)
-            return f"{self._placed(pose, legs)} It is out of reach of motor {which}."
-        length = np.linalg.norm(strut_vectors(self.platform, pose), axis=-1)
-        short = np.flatnonzero(length <= NO_LENGTH * self.platform.size)
-        if len(short):
-            return f"Leg {short[0] + 1} would have no length there."
-        return None
-
 
 def pose_numbers(pose: Pose) -> Array:
-    """x, y, z and Euler angles [deg] of poses, (..., 6)."""
+    """x, y, z [platform unit] and Euler angles [deg] of poses, (..., 6)."""
     return np.concatenate([pose.position, np.degrees(pose.euler)], axis=-1)
+
+
+def leg_factor(platform: Platform) -> float:
+    """Factor from readings to the numbers on the page, where motor angles are in degrees."""
+    return 180 / np.pi if platform.legs == "rotary" else 1.0
+
+
+def leg_unit(platform: Platform) -> str:
+    """Unit of the readings on the page."""
+    return "deg" if platform.legs == "rotary" else platform.unit
+
+
+def limits_text(platform: Platform, pose: Pose, legs: Array) -> str:
+    """Sentence that names the stated limits which a pose keeps, or those that it exceeds."""
+    beyond = _beyond_stroke(platform, legs)
+    if not in_workspace(platform, pose):
+        beyond.append("outside the stated workspace")
+    if beyond:
+        return f"Shown beyond its limits: {'; '.join(beyond)}."
+    stated = {"stroke": platform.stroke, "workspace": platform.workspace}
+    names = [name for name, limit in stated.items() if limit is not None]
+    return f"Within {' and '.join(names)}." if names else "The platform states no limits."
+
+
+def _beyond_stroke(platform: Platform, legs: Array) -> list[str]:
+    """Legs below and above their stroke, with the largest distance to its end."""
+    if platform.stroke is None:
+        return []
+    what = "motor" if platform.legs == "rotary" else "leg"
+    outside, parts = outside_stroke(platform, legs), []
+    low, high = platform.stroke.T
+    for side, miss in (("below", low - legs), ("above", legs - high)):
+        which = np.flatnonzero(outside & (miss > 0))
+        if len(which):
+            names = f"{what}{'s' * (len(which) > 1)} {', '.join(str(i + 1) for i in which)}"
+            most = f"{leg_factor(platform) * miss[which].max():.3g} {leg_unit(platform)}".rstrip()
+            limit = "its" if len(which) == 1 else "their"
+            parts.append(f"{names} {side} {limit} stroke by {'up to ' * (len(which) > 1)}{most}")
+    return parts
+
+
+def _problem(platform: Platform, pose: Pose, legs: Array) -> str:
+    """Reason why a pose cannot be shown; empty if it can."""
+    if not np.all(np.isfinite(pose.position)):
+        return "A number is not finite."
+    missing = np.flatnonzero(~np.isfinite(legs))
+    if len(missing):
+        motors = ", ".join(str(i + 1) for i in missing)
+        return f"Arm and rod are too short for this pose: motor {motors}."
+    length = np.linalg.norm(strut_vectors(platform, pose), axis=-1)
+    short = np.flatnonzero(length <= SHORTEST_STRUT * platform.size)
+    return f"Leg {short[0] + 1} would have no length." if len(short) else ""

@@ -1,4 +1,4 @@
-"""A file of poses or readings as a trajectory to look at, of a bounded number of rows."""
+"""Rows of a file of poses or readings that the page plays, evenly spread over the file."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from gough.files import trajectory as files
 from gough.files.rows import Reading
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.view.follow import has_pose
-from gough.view.model import Answer
+from gough.status import Status
+from gough.view.follow import REFUSED, has_pose
+from gough.view.model import Answer, limits_text
 
 ROWS_A_SECOND = 30.0  # at which a file without times is played
 
@@ -26,12 +27,12 @@ class Trajectory:
 
     Attributes:
         name: the file's name.
-        of: "poses" or "leg readings", what the file holds.
+        of: content of the file, "poses" or "leg readings".
         number: (N,) rows' numbers in the file, from 1.
         total: rows in the file.
         time: (N,) [s], rising; from the file if `timed`, else 30 rows of the file a second.
         pose: batch (N,). legs: (N, 6). NaN where there is none.
-        answers: what is known about each.
+        answers: result of each row.
     """
 
     name: str
@@ -49,12 +50,12 @@ class Trajectory:
 
     @property
     def failures(self) -> int:
-        """Rows without a pose to show."""
+        """Number of rows without a pose."""
         return sum(not answer.reached for answer in self.answers)
 
     @property
     def about(self) -> str:
-        """What is shown of which file, in a sentence."""
+        """Sentence that names the file and the rows shown."""
         rows = f"{self.total:,} rows of {self.of}"
         if len(self) < self.total:
             step = int(self.number[1] - self.number[0])
@@ -64,11 +65,11 @@ class Trajectory:
 
     @property
     def pace(self) -> str:
-        """What playing at 1x means."""
-        return "1x: as fast as it was" if self.timed else f"1x: {ROWS_A_SECOND:.0f} rows a second"
+        """Meaning of the speed 1x."""
+        return "1x: real time" if self.timed else f"1x: {ROWS_A_SECOND:.0f} rows per second"
 
     def where(self, row: int) -> str:
-        """Which row of the file is shown, and its time."""
+        """Number of a row in the file, and its time."""
         time = f", {self.time[row]:.6g} s" if self.timed else ""
         return f"row {self.number[row]:,.0f} of {self.total:,}{time}"
 
@@ -119,7 +120,7 @@ def read(
         reading: options for reading the file.
 
     Raises:
-        GoughError: what is wrong with the file, where, and what to do.
+        GoughError, InputError: fewer than two rows wanted, or an error in the file.
     """
     if rows < 2:
         raise GoughError(f"--rows {rows}: expected 2 or more")
@@ -133,10 +134,8 @@ def read(
         clock = _times(str(path), time, found)
     of, how = ("poses", "inverse") if file.has_poses else ("leg readings", "forward")
     answers = [
-        Answer(has_pose(outcome), outcome.text, f"{how} kinematics", float(residual), int(steps))
-        for outcome, residual, steps in zip(
-            found.outcomes, found.residual, found.iterations, strict=True
-        )
+        Answer(*_reached(platform, found, i), f"{how} kinematics", float(residual), int(steps))
+        for i, (residual, steps) in enumerate(zip(found.residual, found.iterations, strict=True))
     ]
     return Trajectory(
         Path(path).name, of, found.number, thin.total, clock, time is not None, found.pose,
@@ -144,8 +143,18 @@ def read(
     )  # fmt: skip
 
 
+def _reached(platform: Platform, rows: files.Trajectory, i: int) -> tuple[bool, str]:
+    """True with the limits of a row's pose; False with the reason why it has none."""
+    status = rows.outcomes[i]
+    if has_pose(status):
+        text = limits_text(platform, rows.pose[i], rows.legs[i])
+        return True, text if status.usable else f"Marked {status.label}. {text}"
+    forward = isinstance(status, Status)
+    return False, REFUSED[status.label] if forward else status.text
+
+
 def _times(where: str, name: str, rows: files.Trajectory) -> Array:
-    """Times since the first.
+    """Times (N,) since the first row.
 
     Raises:
         InputError: naming the first row that has no time, or an earlier one than its predecessor.

@@ -1,4 +1,4 @@
-"""The page and what stands behind it: wishes come in, one thread carries them out in order."""
+"""The page and its state: requests arrive in a queue, and one thread handles them in order."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gough.platform import Platform
-from gough.view import server as servers
 from gough.view.export import page
 from gough.view.model import Model
-from gough.view.panel import FIND, Panel, row_of
-from gough.view.scene import Scene
+from gough.view.panel import FIND, Panel
+from gough.view.scene import Scene, close_server, open_server
 from gough.view.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -23,45 +22,46 @@ if TYPE_CHECKING:
 
     from gough.modes.result import AssemblyModes
 
-SAME_POSE = 1e-7  # shares of the size and radians that tell modes from the picture's pose
-SPEAKING = 1 / 20  # [s] between changes of the panel's numbers
-FRAME = 1 / 60  # [s] between rows that are played
-PATIENCE = 2.0  # [s] to wait for a browser before the solver is compiled
+SAME_POSE = 1e-7  # translation / size + rotation [rad] below which a mode is the picture's pose
+PANEL_PERIOD = 1 / 20  # [s] between changes of the panel's numbers
+FRAME = 1 / 60  # [s] between rows of a file
+BROWSER_WAIT = 2.0  # [s] for a browser to draw before the solver is compiled
+UNDO_PAUSE = 1.0  # [s] without a request, after which Undo counts a new move
 COMPILING = (
-    "The solver is being compiled, which takes some seconds the first time. Pose sliders and the "
-    "handle work already; leg sliders and modes as soon as it is done."
+    "The solver is being compiled, which takes some seconds the first time. Sliders of the pose "
+    "and the handle work already; sliders of the legs and modes follow."
 )
-LOOKING = "Looking for all poses with these readings (the first time compiles for some seconds) ..."
+SEARCHING = "Searching for all poses with these readings (compiled on first use: some seconds) ..."
 OUTDATED = f"The readings have changed since the modes were found: press “{FIND}”."
-# wishes of which only the newest counts
-CONTINUOUS = ("legs", "numbers", "drag", "row", "tick")
+CONTINUOUS = ("legs", "numbers", "drag", "row", "tick")  # only the newest request counts
+MOVES = ("legs", "numbers", "drag", "home", "pick")  # requests that Undo takes back
 
 
-class Wishes:
-    """What was asked for and not yet done; of a slider that is being dragged, the newest only."""
+class RequestQueue:
+    """Requests from the page that are not handled yet; of a dragged slider, the newest only."""
 
     def __init__(self) -> None:
         self._queue: deque[tuple[str, dict]] = deque()
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
 
-    def post(self, kind: str, what: dict) -> None:
-        """Ask for something; `what` of wishes of one kind in a row are merged."""
-        with self._news:
+    def post(self, kind: str, values: dict) -> None:
+        """Add a request; a continuous one is merged with the same kind at the end of the queue."""
+        with self._changed:
             if kind in CONTINUOUS and self._queue and self._queue[-1][0] == kind:
-                self._queue[-1][1].update(what)
+                self._queue[-1][1].update(values)
             else:
-                self._queue.append((kind, dict(what)))
-            self._news.notify()
+                self._queue.append((kind, dict(values)))
+            self._changed.notify()
 
-    def take(self, patience: float | None) -> tuple[str, dict] | None:
-        """The next wish, once there is one; None if there is none for `patience` [s]."""
-        with self._news:
-            self._news.wait_for(lambda: self._queue, patience)
+    def get(self, timeout: float | None) -> tuple[str, dict] | None:
+        """Return the next request, or None after `timeout` seconds without one."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._queue, timeout)
             return self._queue.popleft() if self._queue else None
 
 
 class Viewer:
-    """A machine on a page, served until `close`."""
+    """Page with one machine, served until `close`."""
 
     def __init__(
         self,
@@ -71,19 +71,20 @@ class Viewer:
         port: int | None = None,
         trajectory: Trajectory | None = None,
     ) -> None:
-        """Draws at once; the solver is compiled behind it.
+        """Draw the machine at home, and compile the solver in the background.
 
         Raises:
             GoughError: the port is taken.
         """
         self.platform, self.trajectory = platform, trajectory
         self.model = Model(platform)
-        self.server = servers.start(host, port, f"gough · {platform.name}")
-        self._wishes = Wishes()
+        self.server = open_server(host, port, f"gough · {platform.name}")
+        self._requests = RequestQueue()
         self.scene = Scene(self.server, platform)
-        self.panel = Panel(self.server, platform, self._wishes.post, trajectory)
+        self.panel = Panel(self.server, platform, self._requests.post, trajectory)
         self._note, self._ready, self._dragging = COMPILING, False, False
         self._modes: AssemblyModes | None = None
+        self._last_move = "", 0.0
         self._row, self._playing, self._speed = 0, False, 1.0
         self._failure: BaseException | None = None
         self._connected = threading.Event()
@@ -91,35 +92,35 @@ class Viewer:
         self._listen_to_handle()
         self.panel.enable(False)
         if trajectory is not None:
-            self.scene.show_way(trajectory.pose)
+            self.scene.show_path(trajectory.pose)
             self._show_row({"row": 0})
         self._draw()
-        self._tell()
+        self._show_panel()
         self._worker = self._start(self._work)
         self._start(self._prepare)
 
     @property
     def port(self) -> int:
-        """The port it listens at."""
+        """Port of the page."""
         return self.server.get_port()
 
     def wait(self) -> None:
-        """Serve until a signal interrupts, or until something goes wrong, which is raised."""
+        """Serve until a signal interrupts; an error in a thread is raised."""
         while self._failure is None:
             time.sleep(0.1)
         raise self._failure
 
     def close(self) -> None:
-        """End the server and the threads behind it; one that compiles ends when it has done so."""
+        """End the server and its threads; compiling is waited for."""
         self._playing = False
-        self._wishes.post("close", {})
+        self._requests.post("close", {})
         self._worker.join()
-        servers.stop(self.server)
+        close_server(self.server)
 
     # ---- threads ----------------------------------------------------------------------
 
     def _start(self, work: Callable[..., None], *arguments: Any) -> threading.Thread:
-        """Run something beside the rest; what it raises, `wait` raises in the main thread."""
+        """Run `work` in a thread; `wait` raises its exceptions in the main thread."""
 
         def run() -> None:
             try:
@@ -132,34 +133,45 @@ class Viewer:
         return thread
 
     def _work(self) -> None:
-        """Carry out wishes, one after the other."""
-        told, stale = 0.0, False
+        """Handle requests, one after the other."""
+        shown, stale = 0.0, False
         while True:
-            wish = self._wishes.take(SPEAKING if stale else None)
-            if wish is not None:
-                kind, what = wish
+            request = self._requests.get(PANEL_PERIOD if stale else None)
+            if request is not None:
+                kind, values = request
                 if kind == "close":
                     return
-                getattr(self, f"_on_{kind}")(what)
+                self._remember(kind)
+                getattr(self, f"_on_{kind}")(values)
                 self._draw()
-            # numbers that nobody can read are left out, for the picture's sake
-            stale = wish is not None and time.monotonic() - told < SPEAKING
+            # the picture moves more often than numbers can be read
+            stale = request is not None and time.monotonic() - shown < PANEL_PERIOD
             if not stale:
-                self._tell()
-                told = time.monotonic()
+                self._show_panel()
+                shown = time.monotonic()
+
+    def _remember(self, kind: str) -> None:
+        """Keep the pose for Undo where a new move begins."""
+        if kind not in MOVES:
+            return
+        now = time.monotonic()
+        if kind != self._last_move[0] or now - self._last_move[1] > UNDO_PAUSE:
+            self.model.remember()
+        self._last_move = kind, now
 
     def _prepare(self) -> None:
-        """Compile what leg sliders need, after the browser has drawn, which would be held up."""
+        """Compile the solver, once the browser has drawn the first picture."""
         from gough.view.follow import follow
 
-        self._connected.wait(PATIENCE)
-        home = self.platform.home, self.platform.home_legs
-        follow(self.platform, *home, home[1])
-        follow(self.platform, *home, home[1] * 0 + 1e3 * self.platform.size)  # none: tries all
-        self._wishes.post("ready", {})
+        self._connected.wait(BROWSER_WAIT)
+        home, legs = self.platform.home, self.platform.home_legs
+        nowhere = np.full(6, 1e3 * self.platform.size)  # no pose has these: all restarts
+        for target in (legs, nowhere):
+            follow(self.platform, home, legs, target)
+        self._requests.post("ready", {})
 
     def _play(self) -> None:
-        """Post rows as time goes by, until the last."""
+        """Post rows at the speed of the player, until the last."""
         assert self.trajectory is not None
         times = self.trajectory.time
         if self._row >= len(times) - 1:
@@ -170,15 +182,15 @@ class Viewer:
             begin, last = last, time.monotonic()
             now += self._speed * (last - begin)
             if self._playing:
-                self._wishes.post("tick", {"row": row_of(times, now)})
-        self._wishes.post("pause", {})
+                self._requests.post("tick", {"row": row_of(times, now)})
+        self._requests.post("pause", {})
 
     def _find(self, legs: np.ndarray) -> None:
         from gough.modes.assembly import assembly_modes
 
-        self._wishes.post("found", {"modes": assembly_modes(self.platform, legs)})
+        self._requests.post("found", {"modes": assembly_modes(self.platform, legs)})
 
-    # ---- wishes -----------------------------------------------------------------------
+    # ---- requests ---------------------------------------------------------------------
 
     def _on_ready(self, _: dict) -> None:
         self._note, self._ready = "", True
@@ -203,17 +215,27 @@ class Viewer:
     def _on_home(self, _: dict) -> None:
         self._playing = False
         self.model.home()
+        self.panel.reset_ranges()
 
-    def _on_forget(self, _: dict) -> None:
-        self.model.forget()
+    def _on_undo(self, _: dict) -> None:
+        self._playing, self._last_move = False, ("", 0.0)
+        self.model.undo()
 
-    def _on_handle(self, what: dict) -> None:
+    def _on_handle(self, _: dict) -> None:
         if self.scene.handle is not None:
-            self.scene.handle.visible = what["visible"]
+            self.scene.handle.visible = not self.scene.handle.visible
+
+    def _on_camera(self, what: dict) -> None:
+        client: viser.ClientHandle | None = what["client"]
+        if client is not None:
+            with client.atomic():
+                place, target, up = self.scene.camera(what["view"])
+                client.camera.up_direction = up
+                client.camera.position, client.camera.look_at = place, target
 
     def _on_find(self, _: dict) -> None:
         self.panel.modes.find.disabled = True
-        self.panel.modes.clear(LOOKING)
+        self.panel.modes.clear(SEARCHING)
         self._start(self._find, self.model.legs)
 
     def _on_found(self, what: dict) -> None:
@@ -224,21 +246,21 @@ class Viewer:
             return
         self._modes = modes
         self.panel.modes.show(modes)
-        pick = lambda index: self._wishes.post("pick", {"mode": index})  # noqa: E731
-        self.scene.show_ghosts(modes.pose, modes.legs, modes.sign, pick)
+        pick = lambda index: self._requests.post("pick", {"mode": index})  # noqa: E731
+        self.scene.show_modes(modes.pose, modes.legs, modes.sign, pick)
 
     def _on_pick(self, what: dict) -> None:
         if self._modes is not None:
             index = what["mode"]
             pose, residual = self._modes.pose[index], float(self._modes.residual[index])
-            self.model.pick(pose, residual, "assembly mode")
+            self.model.pick(pose, residual)
 
     def _on_row(self, what: dict) -> None:
         self._playing = False
         self._show_row(what)
 
     def _on_tick(self, what: dict) -> None:
-        if self._playing:  # else paused since
+        if self._playing:  # else it has been paused meanwhile
             self._show_row(what)
 
     def _on_play(self, _: dict) -> None:
@@ -269,27 +291,27 @@ class Viewer:
         self.model.show(rows.pose[i], rows.legs[i], rows.answers[i])
 
     def _draw(self) -> None:
-        """Bring the picture to the model."""
+        """Draw the model's pose."""
         if self._modes is not None and not np.array_equal(self._modes.legs, self.model.legs):
             self._modes = None
-            self.scene.clear_ghosts()
+            self.scene.clear_modes()
             self.panel.modes.clear(OUTDATED)
         self.scene.draw(self.model.pose, self.model.legs, handle=not self._dragging)
 
-    def _tell(self) -> None:
-        """Bring the panel to the model."""
+    def _show_panel(self) -> None:
+        """Show the model's numbers."""
         self.panel.modes.mark(self._shown_mode())
         with self.server.atomic():
             self.panel.show(self.model, self._note)
-            if self.trajectory is not None:
+            if self.panel.player is not None:
                 self.panel.player.show(self._row, self._playing)
 
     def _shown_mode(self) -> int | None:
-        """Which of the modes the picture shows."""
+        """Index of the mode in the picture, or None."""
         if self._modes is None or not len(self._modes.row):
             return None
-        shift, turn = self._modes.pose.distance(self.model.pose)
-        gap = shift / self.platform.size + turn
+        translation, rotation = self._modes.pose.distance(self.model.pose)
+        gap = translation / self.platform.size + rotation
         best = int(np.argmin(gap))
         return best if gap[best] < SAME_POSE else None
 
@@ -301,6 +323,11 @@ class Viewer:
         async def _(event: viser.TransformControlsEvent) -> None:
             where = {"position": np.array(handle.position), "wxyz": np.array(handle.wxyz)}
             if event.phase == "end":
-                self._wishes.post("drop", {})
+                self._requests.post("drop", {})
             elif event.phase == "update":
-                self._wishes.post("drag", where)
+                self._requests.post("drag", where)
+
+
+def row_of(values: np.ndarray, value: float) -> int:
+    """Index of the last of rising values (N,) that does not exceed `value`; 0 if all do."""
+    return max(0, int(np.searchsorted(values, value, side="right")) - 1)
