@@ -65,7 +65,9 @@ def test_a_short_run_learns_and_leaves_all_files(tmp_path):
     assert guess.distance(pose)[0].mean() < 15
 
 
-@pytest.mark.parametrize("kind", ["disgnet", "plain-mlp", "gcn", "graphmlp", "wise-mlp"])
+@pytest.mark.parametrize(
+    "kind", ["disgnet", "disgnet-nonlinear", "plain-mlp", "gcn", "graphmlp", "wise-mlp"]
+)
 def test_every_network_learns(tmp_path, kind):
     options = {"width": 16} | ({"hidden": 32} if kind == "graphmlp" else {})
     config = with_model(tiny(), kind, **options)

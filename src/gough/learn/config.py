@@ -1,4 +1,4 @@
-"""All that a training run is told, one frozen dataclass per concern.
+"""Settings of a training run, one frozen dataclass per concern.
 
 The same objects are the API, the command line (by tyro) and the file `config.json`.
 """
@@ -11,86 +11,88 @@ from typing import Any, Literal
 
 from gough.errors import GoughError
 
-Kind = Literal["resmlp", "disgnet", "plain-mlp", "wise-mlp", "gcn", "graphmlp"]
+Kind = Literal[
+    "resmlp", "disgnet", "disgnet-nonlinear", "plain-mlp", "wise-mlp", "gcn", "graphmlp"
+]  # fmt: skip
 UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """Which network."""
+    """Network."""
 
     kind: Kind = "resmlp"
     """Name of the network."""
     options: dict[str, int] = field(default_factory=dict)
-    """The network's own options, such as `width 96`; its class says which there are."""
+    """Options of the network, such as `width 96`; its class lists them."""
 
 
 @dataclass(frozen=True)
 class DataConfig:
-    """What it learns from."""
+    """Training data."""
 
     batch: int = 500
     """Samples per step, over all processes together."""
     samples: int | None = None
-    """Size of a fixed training set; none: every step draws fresh samples."""
+    """Size of a fixed training set; without it every step draws fresh samples."""
     same_assembly: bool = False
     """Leave out poses beyond a singularity (det J not of home's sign)."""
     test: int = 2000
-    """Samples that the metrics are computed on while training."""
+    """Number of samples that the errors are measured on during the training."""
 
 
 @dataclass(frozen=True)
 class LossConfig:
-    """What is made small."""
+    """Loss weights."""
 
     beta: float | None = None
-    """Weight of the rotation [platform unit]; none: 0.3 of the platform's size."""
+    """Weight of the rotation [platform unit]; 0.3 of the platform's size unless given."""
 
 
 @dataclass(frozen=True)
 class OptimiserConfig:
-    """How."""
+    """Optimizer settings."""
 
     kind: Literal["soap", "adam", "adamw"] = "soap"
-    """Optimiser."""
+    """Optimizer."""
     lr: float = 5e-3
-    """Learning rate at its highest."""
+    """Highest learning rate."""
     weight_decay: float = 0.0
     """Decoupled weight decay."""
     schedule: Literal["falling", "constant"] = "falling"
-    """falling: after `hold` of the run the rate falls to zero at its end."""
+    """falling: after the share `hold` of the run the rate falls, to zero at the end."""
     power: float = 2.0
-    """The rate falls as this power of the time left; 1: along a line."""
+    """The rate falls as this power of the time left; 1 is linear."""
     warmup: int = 200
     """Steps over which the rate rises from zero, at most 5 % of the run."""
     hold: float = 0.3
-    """Share of the run for which the rate stays."""
+    """Share of the run during which the rate is constant."""
     average: float = 0.0
-    """Decay of an exponential average of the weights, which is then what is kept; 0: none."""
+    """Decay of an exponential average of the weights, which becomes the result; 0: no average."""
 
 
 @dataclass(frozen=True)
 class RunConfig:
-    """How long, where, and from which seed."""
+    """Length, device and random seed of the run."""
 
     budget: str | None = None
-    """Time to train, such as 90s, 30m or 2h; the schedule fits itself to it."""
+    """Time to train, such as 90s, 30m or 2h; the schedule adapts to it."""
     clock: Literal["wall", "processor"] = "wall"
-    """What a budget counts: time, or this process's processor time (on a shared machine)."""
+    """Clock of the budget: time, or this process's processor time (for a shared machine)."""
     steps: int | None = None
-    """Number of steps, instead of a budget: such a run can be repeated bit for bit."""
+    """Number of steps instead of a budget; such a run can be repeated bit for bit."""
     epochs: int | None = None
     """Number of passes over a fixed training set, instead of steps."""
     seed: int = 0
-    """Of the weights at the start and of the samples."""
+    """Seed of the first weights and of the samples."""
     device: str = "auto"
     """auto, cpu, cuda or cuda:1; auto takes a GPU if there is one."""
     threads: int | None = None
-    """CPU threads; none: as many as PyTorch takes."""
+    """CPU threads; PyTorch's default unless given."""
     dtype: Literal["float32", "float64"] = "float32"
-    """Of the weights."""
+    """Precision of the weights."""
     shards: int = 1
-    """Parts that a step's samples are drawn in; at least the number of processes."""
+    """Number of parts that a step's samples are drawn in; at least the number of processes."""
     checkpoint_every: float = 120.0
     """Seconds between checkpoints."""
     log_every: float = 10.0
@@ -99,7 +101,7 @@ class RunConfig:
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """A whole run."""
+    """All settings of a run."""
 
     model: ModelConfig = ModelConfig()
     data: DataConfig = DataConfig()
@@ -130,28 +132,28 @@ class TrainConfig:
             raise GoughError(f"optimiser.hold: expected 0 to 1, got {self.optimiser.hold}")
 
     def total_steps(self) -> int | None:
-        """Steps of the run, None under a budget."""
+        """Number of steps of the run, None under a budget."""
         if self.run.epochs is not None and self.data.samples is not None:
             return self.run.epochs * (self.data.samples // self.data.batch)
         return self.run.steps
 
     def with_run(self, **changes: Any) -> TrainConfig:
-        """The same with other settings of the run; a new length replaces the old one."""
+        """Copy with other settings of the run; a new length replaces the old one."""
         lengths = {"budget", "steps", "epochs"}
         if lengths & changes.keys():
             changes = dict.fromkeys(lengths) | changes
         return replace(self, run=replace(self.run, **changes))
 
     def to_json(self) -> str:
-        """As the text of `config.json`."""
+        """Write the text of `config.json`."""
         return json.dumps(asdict(self), indent=2) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> TrainConfig:
-        """From the text of `config.json`.
+        """Read the text of `config.json`.
 
         Raises:
-            GoughError: not such a text.
+            GoughError: the text is no training configuration.
         """
         try:
             facts = json.loads(text)
@@ -163,7 +165,7 @@ class TrainConfig:
 
 
 def seconds(text: str) -> float:
-    """Seconds that "90s", "30m", "1.5h" or "45" stand for.
+    """Convert a time such as "90s", "30m", "1.5h" or "45" to seconds.
 
     Raises:
         GoughError: not a time above zero.

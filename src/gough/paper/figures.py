@@ -146,8 +146,8 @@ def _percent(curve: dict) -> np.ndarray:
 
 
 def _line(i: int) -> dict:
-    colour, style = CURVES[i]
-    return {"color": colour, "linestyle": style}
+    colour, style = CURVES[i % len(CURVES)]
+    return {"color": colour, "linestyle": style, "alpha": 1.0 if i < len(CURVES) else 0.5}
 
 
 FIGURES: dict[str, Callable[[Study], Figure]] = {

@@ -19,7 +19,7 @@ from gough.learn.evaluate import DEGREES, Row, evaluate, median_time
 from gough.learn.metrics import THRESHOLDS, measure
 from gough.paper.methods import Method, Success, batched, ours, scipy, sequential
 from gough.paper.published import GAMMAS
-from gough.paper.study import KINDS, Study, with_workspace_of
+from gough.paper.study import Study, with_workspace_of
 from gough.plot.histograms import LogHistogram
 from gough.pose import Pose
 from gough.seeds.base import Seed
@@ -58,7 +58,7 @@ def sets(study: Study) -> dict:
     truth, legs = study.test_set()
     out = []
     for name in ("full", "90", "80"):
-        for kind in KINDS:
+        for kind in study.kinds:
             guess = study.network(name, kind).guess(legs)
             found = asdict(measure(study.platform, guess, truth, legs))
             axis = _along_axes(np.abs(guess.position - truth.position))
@@ -107,7 +107,7 @@ def wide(study: Study) -> dict:
         out[key] = [_network_row(row) for row in rows]
     truth, legs = study.test_set(WIDE_SOLVED * study.plan.solved, "wide", same_assembly=True)
     seeds: list[Seed] = [PolynomialSeed(machine, degree) for degree in (0, *DEGREES)]
-    seeds += [study.network("wide", kind) for kind in KINDS]
+    seeds += [study.network("wide", kind) for kind in study.kinds]
     for row, seed in zip(out["same"], seeds, strict=True):
         for key in ("batched", "scaled"):
             method = batched(machine, seed, scaled=key == "scaled")
@@ -136,7 +136,7 @@ def _along_axes(away: Array) -> dict:
 
 def _names(study: Study, name: str) -> list[str]:
     """First guesses of a table, as `evaluate` takes them."""
-    return ["home", *POLYNOMIALS, *(str(study.network_path(name, kind)) for kind in KINDS)]
+    return ["home", *POLYNOMIALS, *(str(study.network_path(name, kind)) for kind in study.kinds)]
 
 
 def _network_row(row: Row) -> dict:
@@ -156,7 +156,7 @@ def _network_row(row: Row) -> dict:
 def curves(study: Study) -> dict:
     """Errors of every network on 2,000 held-out poses while it trained on the full set."""
     out: dict[str, Any] = {}
-    for kind in KINDS:
+    for kind in study.kinds:
         path = study.curve_path(kind)
         try:
             with path.open(newline="") as file:
@@ -233,7 +233,7 @@ def poses(study: Study) -> dict:
 def errors(study: Study) -> dict:
     """Histograms of the errors on a log axis, of the guesses and after the second stage."""
     truth, legs = study.test_set()
-    guesses = {kind: study.network("full", kind).guess(legs) for kind in KINDS}
+    guesses = {kind: study.network("full", kind).guess(legs) for kind in study.kinds}
     found = {kind: guess.distance(truth) for kind, guess in guesses.items()}
     few = slice(0, 10 * study.plan.solved)
     second = batched(study.platform, _Guessed(guesses["disgnet"][few]))

@@ -152,10 +152,15 @@ class Study:
 
     # ---- networks ---------------------------------------------------------------------
 
+    @property
+    def kinds(self) -> list[Kind]:
+        """The networks that the plan states steps for."""
+        return [kind for kind in KINDS if kind in self.plan.steps]
+
     def train(self, sets: Iterable[str] = tuple(SETS), *, show: bool = True) -> None:
         """Train the networks of the SETS that are missing; a run that was stopped goes on."""
         for name in sets:
-            for kind in KINDS:
+            for kind in self.kinds:
                 target = self.network_path(name, kind)
                 if target.exists():
                     continue
@@ -180,7 +185,7 @@ class Study:
 
     def sums(self) -> dict[str, dict]:
         """Size [bytes] and SHA-256 of each network that is there, by its path."""
-        paths = [self.network_path(name, kind) for name in SETS for kind in KINDS]
+        paths = [self.network_path(name, kind) for name in SETS for kind in self.kinds]
         contents = {p: p.read_bytes() for p in paths if p.exists()}
         return {
             p.relative_to(self.networks).as_posix(): {
