@@ -14,7 +14,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from gough.checks import Array
 from gough.errors import GoughError
 from gough.fk.solution import Solution
 from gough.fk.solve import solve as fast_solve
@@ -76,7 +75,7 @@ def solve(
     flat = legs.reshape(-1, 6)
     readings = flat.detach().double().cpu().numpy()
     if base is not None or moving is not None:
-        seed = seed if isinstance(seed, Pose) else _SeedOfOtherJoints(find_seed(platform, seed))
+        seed = find_seed(platform, seed)  # of the platform's own joints
         platform = _replace_joints(platform, base, moving)
     found = fast_solve(platform, readings, seed=seed)
     tensor = lambda x: torch.as_tensor(x, device=legs.device)  # noqa: E731
@@ -114,18 +113,6 @@ def leg_lengths(
     return _with_joints("position", platform, position, base, moving).leg_lengths(
         position, rotation
     )
-
-
-class _SeedOfOtherJoints:
-    """The first guesses of a seed that was made for the platform's own joints."""
-
-    name = "seed of the platform's own joints"
-
-    def __init__(self, seed: Seed) -> None:
-        self._seed = seed
-
-    def guess(self, legs: Array) -> Pose:
-        return self._seed.guess(legs)
 
 
 def _with_joints(name: str, platform: Platform, like: Tensor, base: Tensor | None,

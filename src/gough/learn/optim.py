@@ -4,6 +4,12 @@ SOAP is Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al., SOAP: I
 Stabilizing Shampoo using Adam (2024), algorithm 3). The bases are refreshed by one step of
 orthogonal iteration, which is cheap for matrices of this size; vectors (biases, gains) get plain
 Adam.
+
+Libraries were compared on `resmlp` of the reference platform (batch 500, one thread, one run each):
+after 600 steps E-trans was 0.147 mm with this one and 0.137 mm with pytorch-optimizer 4.1; after
+20 s of processor time 0.063 mm (927 steps) and 0.078 mm (830 steps); heavyball 3.2 first compiles
+kernels, which takes longer than a short run. As good within the noise, but slower: this one stays,
+and its state is plain tensors, which a checkpoint without pickle can hold.
 """
 
 from __future__ import annotations
