@@ -11,14 +11,12 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 import gough
-from gough.certificate import certify_batch
 from gough.kernel.threads import cores
-from gough.modes.starts import find_start, start_of
+from gough.modes.starts import find_start_system, start_system
 
 MACHINES = (
     "dietmaier", "reference", "matlab_stewart", "nasa_msfc", "linuxcnc_genhex", "rubin_camera",
@@ -62,7 +60,7 @@ def general(count: int) -> None:
         joints = rng.normal(size=(2, 6, 3))
         platform = gough.Platform(joints[0], joints[1], gough.Pose([0, 0, 2]))
         began = time.perf_counter()
-        solutions.append(find_start(platform).count)
+        solutions.append(find_start_system(platform).count)
         seconds.append(time.perf_counter() - began)
     print(f"with 40 complex solutions {solutions.count(40)} of {count}")
     print(f"start system of a platform: median {1e3 * np.median(seconds):.1f} ms")
@@ -82,10 +80,10 @@ def special() -> None:
     ):
         home = gough.Pose([0, 0, 2])
         platform = gough.Platform(joints[0][list(base)], joints[1][list(moving)], home)
-        print(f"{name:28} {find_start(platform).count}")
+        print(f"{name:28} {find_start_system(platform).count}")
     for name in MACHINES:
-        start = start_of(gough.Platform.load(name))
-        print(f"{name:28} {start.count}, paths tracked {len(start.e)}")
+        start = start_system(gough.Platform.load(name))
+        print(f"{name:28} {start.count}, paths tracked {len(start.poses)}")
 
 
 def times(count: int) -> None:
@@ -100,7 +98,7 @@ def machine_times(platform: gough.Platform, count: int) -> str:
     legs = gough.leg_lengths(platform, some_poses(platform, count))
     modes = gough.assembly_modes(platform, legs)
     alone = [clock(lambda row=row: gough.assembly_modes(platform, row)) for row in legs[:200]]
-    one = clock(lambda: gough.assembly_modes(platform, legs, threads=1)) / len(legs)
+    one = clock(lambda: gough.assembly_modes(platform, legs, workers=1)) / len(legs)
     many = clock(lambda: gough.assembly_modes(platform, legs)) / len(legs)
     numbers, how_often = np.unique(modes.counts, return_counts=True)
     seen = ", ".join(f"{n}: {k}" for n, k in zip(numbers, how_often, strict=True))
@@ -114,11 +112,11 @@ def trajectory(count: int) -> None:
     heading(f"a trajectory of {count} readings of the reference machine, all modes of each")
     platform = gough.Platform.load("reference")
     s = np.linspace(0, 20, count)[:, None]
-    shift = 40 * np.sin(s * [1.0, 1.3, 0.7])
-    turn = np.radians(20) * np.sin(s * [0.9, 1.1, 1.7] + 1)
-    truth = gough.Pose.from_rotation_vector(platform.home.position + shift, turn)
+    translation = 40 * np.sin(s * [1.0, 1.3, 0.7])
+    rotation = np.radians(20) * np.sin(s * [0.9, 1.1, 1.7] + 1)
+    truth = gough.Pose.from_rotation_vector(platform.home.position + translation, rotation)
     legs = gough.leg_lengths(platform, truth)
-    seconds = clock(lambda: gough.assembly_modes(platform, legs, threads=1))
+    seconds = clock(lambda: gough.assembly_modes(platform, legs, workers=1))
     modes = gough.assembly_modes(platform, legs)
     distance, angle = modes.pose.distance(truth[modes.row])
     close = (distance < 1e-7 * platform.size) & (angle < 1e-7)
@@ -133,21 +131,13 @@ def certificates(count: int) -> None:
     platform = gough.Platform.load("reference")
     pose = platform.sample_poses(count, 3)
     legs = gough.leg_lengths(platform, pose)
-    parts = np.ascontiguousarray(pose.position), np.ascontiguousarray(pose.wxyz)
-
-    def call():
-        return certify_batch(platform.base[None], platform.moving, legs, *parts)
-
-    call()
-    seconds = min(clock(call) for _ in range(5))
-    certified, radius = call()
-    print(f"{1e9 * seconds / count:.0f} ns per pose, certified {certified.mean():.5%}")
-    low, median = np.percentile(radius, [0, 50])
+    proof = gough.certify(platform, legs, pose)
+    seconds = min(clock(lambda: gough.certify(platform, legs, pose)) for _ in range(5))
+    print(f"{1e9 * seconds / count:.0f} ns per pose, certified {proof.certified.mean():.5%}")
+    low, median = np.percentile(proof.radius, [0, 50])
     print(f"radius of uniqueness [mm]: smallest {low:.2f}, median {median:.2f}")
-    if hasattr(gough, "solve"):
-        solve: Any = getattr(gough, "solve")  # noqa: B009
-        seconds = min(clock(lambda: solve(platform, legs)) for _ in range(3))
-        print(f"gough.solve: {1e9 * seconds / count:.0f} ns per pose, all threads")
+    seconds = min(clock(lambda: gough.solve(platform, legs)) for _ in range(3))
+    print(f"gough.solve: {1e9 * seconds / count:.0f} ns per pose, all threads")
 
 
 def some_poses(platform: gough.Platform, count: int) -> gough.Pose:

@@ -15,10 +15,11 @@ import time
 import numpy as np
 
 import gough
+from gough.kernel.ends import leg_equations, move
 from gough.kernel.jit import jit
+from gough.kernel.linear import pivoted_solve
 from gough.kinematics import equivalent_struts
-from gough.modes.finish import legs_at, solve6, turn_and_shift
-from gough.modes.frames import Frames
+from gough.modes.frames import Frames, Problem
 
 MACHINES = ("linuxcnc_genhex", "matlab_stewart", "nasa_msfc", "reference", "dietmaier")
 STEPS = 60
@@ -26,34 +27,31 @@ MATCH = 1e-5  # normalised distance of poses that are the same
 
 
 @jit(cache=False)
-def search(p, base, squares, e, t, known_e, known_t, hit):
-    """Searches from (S, 4), (S, 3). Counts those that end at each known pose.
+def search(moving, base, squares, poses, known, hit):
+    """Searches from (S, 7) starts. Counts those that end at each of the known poses (M, 7).
 
     Returns:
-        How many end at a pose, and at one that is not known.
+        The number that end at a pose, and of these the number at one that is not known.
     """
-    a, x, trial = np.empty((6, 6)), np.empty(6), np.empty(6)
+    a, system, x, step = np.empty((6, 6)), np.empty((6, 6)), np.empty(6), np.empty(6)
     found, unknown = 0, 0
-    for k in range(e.shape[0]):
+    for k in range(poses.shape[0]):
         left = 1.0
         for _ in range(STEPS):
-            left = legs_at(p, base, squares, e[k], t[k], a, x)
-            if left < 1e-13:
+            left = leg_equations(moving, base, squares, poses[k], a, x)
+            if left < 1e-13 or pivoted_solve(a, x, system, step) == 0.0:
                 break
-            trial[:] = x
-            if not solve6(a, trial):
-                break
-            length = np.sqrt(np.sum(trial * trial))
-            if length > 0.4:  # a turn of some 20 degrees at most
-                trial *= 0.4 / length
-            turn_and_shift(e[k], t[k], trial)
+            length = np.sqrt(np.sum(step * step))
+            if length > 0.4:  # a rotation of some 20 degrees at most
+                step *= 0.4 / length
+            move(poses[k], step)
         if not left < 1e-12:
             continue
         found += 1
         best, nearest = 1e300, -1
-        for m in range(known_e.shape[0]):
-            dot = abs(np.sum(e[k] * known_e[m]))
-            away = np.max(np.abs(t[k] - known_t[m])) + 2 * np.sqrt(max(0.0, 1 - dot))
+        for m in range(known.shape[0]):
+            dot = abs(np.sum(poses[k, 3:] * known[m, 3:]))
+            away = np.max(np.abs(poses[k, :3] - known[m, :3])) + 2 * np.sqrt(max(0.0, 1 - dot))
             if away < best:
                 best, nearest = away, m
         if best < MATCH:
@@ -83,20 +81,21 @@ def check(platform: gough.Platform, poses: int, starts: int) -> tuple:
     truth = wide_poses(platform, poses, rng)
     legs = gough.leg_lengths(platform, truth)
     modes = gough.assembly_modes(platform, legs)
-    shift, turn = modes.pose.distance(truth[modes.row])
+    translation, rotation = modes.pose.distance(truth[modes.row])
     hit = np.zeros(poses, dtype=bool)
-    hit[modes.row[(shift < 1e-6 * platform.size) & (turn < 1e-6)]] = True
+    hit[modes.row[(translation < 1e-6 * platform.size) & (rotation < 1e-6)]] = True
     frames = Frames.of(platform)
-    joints, lengths = equivalent_struts(platform, legs)
-    base, squares = np.ascontiguousarray(frames.base(joints)), frames.squares(lengths)
+    problem = Problem.of(frames, *equivalent_struts(platform, legs))
     found, unknown, unseen = 0, 0, 0
     for k in range(poses):
-        e, t = frames.normal(modes[k].pose)
+        base, squares = np.ascontiguousarray(problem.base[k]), problem.squares[k]
         q = rng.normal(size=(starts, 4))
         q /= np.linalg.norm(q, axis=1, keepdims=True)
-        u = rng.normal(size=(starts, 3)) * np.sqrt(squares[k].mean()) * 0.7
-        hits = np.zeros(len(e), dtype=np.int64)
-        n, bad = search(frames.moving, base[k], squares[k], q, u, e, t, hits)
+        t = rng.normal(size=(starts, 3)) * np.sqrt(squares.mean()) * 0.7
+        known = frames.normalise(modes[k].pose)
+        hits = np.zeros(len(known), dtype=np.int64)
+        begin = np.concatenate([t, q], axis=1)
+        n, bad = search(frames.moving, base, squares, begin, known, hits)
         found, unknown, unseen = found + n, unknown + bad, unseen + int(np.sum(hits == 0))
     seconds = round(time.perf_counter() - began, 1)
     return (
@@ -106,12 +105,10 @@ def check(platform: gough.Platform, poses: int, starts: int) -> tuple:
 
 
 def wide_poses(platform: gough.Platform, count: int, rng: np.random.Generator) -> gough.Pose:
-    """Poses far about home: a fifth of the machine's size, turns up to some 60 degrees."""
-    home = platform.home
-    shift = rng.uniform(-0.15, 0.15, size=(count, 3)) * platform.size
-    return gough.Pose.from_rotation_vector(shift, rng.uniform(-0.7, 0.7, size=(count, 3))) @ (
-        gough.Pose(home.position, home.wxyz)
-    )
+    """Poses far about home: a fifth of the machine's size, rotations up to some 60 degrees."""
+    translation = rng.uniform(-0.15, 0.15, size=(count, 3)) * platform.size
+    rotation = rng.uniform(-0.7, 0.7, size=(count, 3))
+    return gough.Pose.from_rotation_vector(translation, rotation) @ platform.home
 
 
 if __name__ == "__main__":

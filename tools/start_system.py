@@ -3,7 +3,7 @@
     python tools/start_system.py            writes src/gough/modes/start_system.npz
     python tools/start_system.py --check    compares bit for bit with what is stored
 
-Needs python-flint. Joints and a pose are drawn at random in C; the squared lengths are read
+Joints and a pose are drawn at random in C; the squared lengths are read
 off. Solutions are carried round triangles of random complex squared lengths and base joints;
 each comes back as itself or as another one (monodromy), until no loop finds a new one for ten
 loops. The set is then counted again from another random pose of the same hexapod, and each
@@ -20,12 +20,15 @@ from pathlib import Path
 
 import numpy as np
 
-from gough.modes.balls import prove
-from gough.modes.follow import Parameters, follow
-from gough.modes.monodromy import APART, CAREFUL, fill_up, gaussian
-from gough.modes.study import distances, squared_lengths
+from gough.kernel.paths import Complex, LegEquations, track_paths
+from gough.modes.frames import distances, squared_lengths
+from gough.modes.starts import APART, CAREFUL, complete_by_loops, gaussian
 
-STORED = Path(__file__).parents[1] / "src/gough/modes/start_system.npz"
+ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "tests"))
+from balls import prove  # noqa: E402
+
+STORED = ROOT / "src/gough/modes/start_system.npz"
 QUIET = 10  # loops that bring nothing new before the search ends
 SEED = 20
 
@@ -35,32 +38,37 @@ def corner(rng: np.random.Generator):
     return gaussian(rng, 6) * 3, gaussian(rng, 6, 3)
 
 
-def draw(seed: int):
-    """A random hexapod, and a random pose of it as the first solution."""
+def draw(seed: int) -> tuple[Complex, LegEquations, np.random.Generator]:
+    """A random pose (1, 7) of a random hexapod, and the leg equations that it solves."""
     rng = np.random.default_rng(seed)
     base, moving = gaussian(rng, 6, 3), gaussian(rng, 6, 3)
-    e, t = gaussian(rng, 1, 4), gaussian(rng, 1, 3)
+    pose = random_pose(rng)
     # rounded, so that no processor's way of adding shows in what is stored
-    at = Parameters(base, moving, np.round(squared_lengths(e, t, base, moving)[0], 9))
-    return (e, t), at, rng
+    at = LegEquations(base, moving, np.round(squared_lengths(pose, base, moving)[0], 9))
+    return pose, at, rng
 
 
-def refine(e, t, at: Parameters):
+def random_pose(rng: np.random.Generator) -> Complex:
+    """A complex pose (1, 7): position, then quaternion."""
+    e, t = gaussian(rng, 1, 4), gaussian(rng, 1, 3)
+    return np.concatenate([t, e], axis=1)
+
+
+def refine(poses: Complex, at: LegEquations) -> Complex:
     """Solutions correct to the last bit, and a proof that each is one and they are different.
 
     Quaternions are scaled to w = 1, so that the numbers do not depend on how they were found.
     """
-    tried = [prove(at.base, at.moving, at.squares, *pose) for pose in zip(e, t, strict=True)]
+    tried = [prove(at.base, at.moving, at.squares, pose[3:], pose[:3]) for pose in poses]
     proofs = [proof for proof in tried if proof is not None]
     if len(proofs) < len(tried):
         raise SystemExit("a solution cannot be certified")
     print(f"certified: {len(proofs)}; errors up to {max(p.error for p in proofs):.0e}, "
           f"radii of uniqueness from {min(p.radius for p in proofs):.0e}")  # fmt: skip
-    e = np.array([[1.0, *(complex(v / p.e[0]) for v in p.e[1:])] for p in proofs])
-    t = np.array([[complex(v) for v in p.t] for p in proofs])
-    gaps = distances((e, t), (e, t)) + np.eye(len(e))
+    exact = [[*map(complex, p.t), 1.0, *(complex(v / p.e[0]) for v in p.e[1:])] for p in proofs]
+    gaps = distances(np.array(exact), np.array(exact)) + np.eye(len(exact))
     print(f"smallest distance of two solutions: {gaps.min():.3g}")
-    return e, t
+    return np.array(exact)
 
 
 def main() -> int:
@@ -69,22 +77,24 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="compare with the stored file")
     check = parser.parse_args().check
     first, at, rng = draw(SEED)
-    solutions, history = fill_up(first, at, corner, rng, QUIET)
+    solutions, history = complete_by_loops(first, at, corner, rng, QUIET)
     print("solutions after each loop:", *history)
     # the same hexapod from another pose, other loops: its solutions at `at` must be the same
-    other = gaussian(rng, 1, 4), gaussian(rng, 1, 3)
-    there = Parameters(at.base, at.moving, squared_lengths(*other, at.base, at.moving)[0])
-    again, history = fill_up(other, there, corner, np.random.default_rng(SEED + 1), QUIET)
+    other = random_pose(rng)
+    there = LegEquations(at.base, at.moving, squared_lengths(other, at.base, at.moving)[0])
+    loops = np.random.default_rng(SEED + 1)
+    again, history = complete_by_loops(other, there, corner, loops, QUIET)
     print("from another pose:        ", *history)
-    carried = follow(again, there, at.squares[None], at.base[None], share=CAREFUL).finite()
+    carried = track_paths(again, there, at.squares[None], at.base[None], share=CAREFUL).finite()
     gaps = distances(solutions, carried).min(axis=1)
     print(f"largest gap between the two sets: {gaps.max():.1e}")
-    e, t = refine(*solutions, at)
-    error = np.abs(squared_lengths(e, t, at.base, at.moving) - at.squares).max()
-    print(f"{len(e)} solutions, largest error of l^2: {error:.1e}")
-    if len(e) != 40 or len(carried[0]) != 40 or gaps.max() > APART:
+    exact = refine(solutions, at)
+    error = np.abs(squared_lengths(exact, at.base, at.moving) - at.squares).max()
+    print(f"{len(exact)} solutions, largest error of l^2: {error:.1e}")
+    if len(exact) != 40 or len(carried) != 40 or gaps.max() > APART:
         print("expected 40")
         return 1
+    t, e = exact[:, :3], exact[:, 3:]
     order = np.lexsort((np.imag(t[:, 0]), np.real(t[:, 0])))
     out = {"base": at.base, "moving": at.moving, "squares": at.squares}
     out |= {"e": e[order], "t": t[order]}

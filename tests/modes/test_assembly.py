@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import balls
 import numpy as np
 import pytest
 from machines import ALL, TELESCOPIC, general_platform
 from modes.poses import found, poses_of
 
 import gough
+from gough.kernel.paths import track_paths
 from gough.modes import assembly
-from gough.modes.follow import follow
-from gough.modes.starts import find_start
-from gough.modes.study import distances
+from gough.modes.frames import distances
+from gough.modes.starts import find_start_system
 from gough.status import ModesStatus
 
 
@@ -49,11 +50,11 @@ def test_same_call_same_bits(dietmaier):
 
 
 @pytest.mark.parametrize("name", ["reference", "reachy_mini"])
-def test_bits_do_not_depend_on_threads_or_neighbours(name):
+def test_bits_do_not_depend_on_workers_or_neighbours(name):
     platform = gough.Platform.load(name)
     legs = gough.leg_lengths(platform, poses_of(platform, 300))
-    one = gough.assembly_modes(platform, legs, threads=1)
-    three = gough.assembly_modes(platform, legs, threads=3)
+    one = gough.assembly_modes(platform, legs, workers=1)
+    three = gough.assembly_modes(platform, legs, workers=3)
     assert np.array_equal(one.pose.position, three.pose.position)
     for k in (0, 7, 131, 299):
         alone = gough.assembly_modes(platform, legs[k])
@@ -84,7 +85,7 @@ def test_newton_from_random_starts_finds_nothing_more(name):
 
 def test_random_platforms_have_forty_solutions():
     for seed in range(40):
-        assert find_start(general_platform(seed)).count == 40
+        assert find_start_system(general_platform(seed)).count == 40
 
 
 @pytest.mark.parametrize(
@@ -99,26 +100,25 @@ def test_random_platforms_have_forty_solutions():
 )
 def test_special_platforms_have_fewer_solutions(base, moving, planar, count):
     """Counts from the literature: 6-3: 16 (Innocenti, Parenti-Castelli 1990), 6-4: 32."""
-    assert find_start(general_platform(4, base, moving, planar)).count == count
+    assert find_start_system(general_platform(4, base, moving, planar)).count == count
 
 
 @pytest.mark.parametrize(
     ("name", "count"), [("reference", 28), ("nasa_msfc", 28), ("linuxcnc_genhex", 16)]
 )
 def test_planar_machines_track_one_of_each_pair(name, count):
-    start = find_start(gough.Platform.load(name))
+    start = find_start_system(gough.Platform.load(name))
     assert start.paired
-    assert (start.count, len(start.e)) == (count, count // 2)
+    assert (start.count, len(start.poses)) == (count, count // 2)
 
 
 def test_another_seed_finds_the_same_count():
     for name in ALL:
         platform = gough.Platform.load(name)
-        assert find_start(platform, 11).count == find_start(platform, 12).count
+        assert find_start_system(platform, 11).count == find_start_system(platform, 12).count
 
 
 def test_stored_start_system_is_reproduced_and_proven(capsys, monkeypatch):
-    pytest.importorskip("flint")
     import start_system
 
     monkeypatch.setattr("sys.argv", ["start_system.py", "--check"])
@@ -130,22 +130,20 @@ def test_stored_start_system_is_reproduced_and_proven(capsys, monkeypatch):
 
 def test_all_complex_ends_are_proven_in_ball_arithmetic():
     """Forty solutions of three platforms, real and complex, each proven, none twice."""
-    balls = pytest.importorskip("gough.modes.balls")
     for seed in range(3):
         platform = general_platform(seed)
-        start = find_start(platform)
+        start = find_start_system(platform)
         base, squares = (
             start.frames.base(platform.base),
             start.frames.squares(platform.home_lengths),
         )
-        ends = follow((start.e, start.t), start.at, squares[None].astype(complex))
-        e, t = ends.finite()
-        assert len(e) == 40
-        for k in range(40):
-            proof = balls.prove(base, start.frames.moving, squares, e[k], t[k], steps=2)
+        poses = track_paths(start.poses, start.at, squares[None].astype(complex)).finite()
+        assert len(poses) == 40
+        for pose in poses:
+            proof = balls.prove(base, start.frames.moving, squares, pose[3:], pose[:3], steps=2)
             assert proof is not None
             assert proof.error < 1e-12 * proof.radius
-        gaps = distances((e, t), (e, t)) + np.eye(40)
+        gaps = distances(poses, poses) + np.eye(40)
         assert gaps.min() > 1e-4
 
 
@@ -155,10 +153,10 @@ def test_readings_that_fail_at_first_are_done_again(name, monkeypatch):
     platform = gough.Platform.load(name)
     legs = gough.leg_lengths(platform, poses_of(platform, 30))
     usual = gough.assembly_modes(platform, legs)
-    again, redone = assembly._solve_again, []
+    again, redone = assembly.track_again, []
     monkeypatch.setattr(assembly, "SHARE", 20.0)
     monkeypatch.setattr(
-        assembly, "_solve_again", lambda *args: (redone.append(args[1]), again(*args))
+        assembly, "track_again", lambda *args: redone.append(args[2]) or again(*args)
     )
     hasty = gough.assembly_modes(platform, legs)
     assert redone
@@ -187,6 +185,43 @@ def test_invalid_rows_are_answered_in_place():
     assert modes.counts.tolist() == [16, 0, 0, 16]
     assert len(modes) == 4
     assert [len(one) for one in modes] == [16, 0, 0, 16]
+
+
+@pytest.mark.parametrize("name", ["reference", "reachy_mini"])
+def test_all_batch_axes_are_answered(name):
+    """Sets of a batch (2, 3) are those of its six rows, by number, by index and by iteration."""
+    platform = gough.Platform.load(name)
+    legs = gough.leg_lengths(platform, poses_of(platform, 6))
+    flat = gough.assembly_modes(platform, legs)
+    modes = gough.assembly_modes(platform, legs.reshape(2, 3, 6))
+    assert np.array_equal(modes.row, flat.row)
+    assert np.array_equal(modes.counts, flat.counts.reshape(2, 3))
+    assert (len(modes), modes.status.shape, modes.paths.shape) == (2, (2, 3), (2, 3, 4))
+    assert "of 6 sets" in repr(modes)
+    nested = [one for half in modes for one in half]
+    for one, other, single in zip(
+        nested, flat, (modes[k // 3, k % 3] for k in range(6)), strict=True
+    ):
+        for part in (one, single):
+            assert np.array_equal(part.pose.position, other.pose.position)
+            assert np.array_equal(part.certificate.radius, other.certificate.radius)
+            assert np.array_equal(part.residual, other.residual)
+            assert (part.status, len(part), part.row.sum()) == (other.status, len(other), 0)
+    last = modes[:, -1:]
+    assert np.array_equal(last.legs, legs.reshape(2, 3, 6)[:, -1:])
+    assert np.array_equal(last.pose.position[last.row == 1], flat[5].pose.position)
+    choice = gough.choose_mode(modes, near=gough.Pose(np.zeros((2, 3, 3)), [1, 0, 0, 0]))
+    assert choice.count.shape == (2, 3)
+    assert len(choice.best) == 6
+
+
+@pytest.mark.parametrize("length", [1e20, 1e60, 1e308])
+def test_huge_readings_have_no_pose(length):
+    platform = gough.Platform.load("reference")
+    modes = gough.assembly_modes(platform, [[length, *platform.home_legs[1:]], platform.home_legs])
+    assert modes.counts.tolist() == [0, 16]
+    choice = gough.choose_mode(modes)
+    assert choice.count.tolist() == [0, 1]
 
 
 def test_unreachable_legs_have_no_pose_and_the_list_is_complete():

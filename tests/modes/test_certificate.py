@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import balls
 import numpy as np
 import pytest
 from machines import ALL
@@ -9,7 +10,8 @@ from modes.poses import poses_of
 
 import gough
 from gough import quaternion
-from gough.certificate import TURNS, _bulk_with, certify_batch
+from gough.certificate import TURNS, _bounds
+from gough.kernel import bounds, lanes
 from gough.kinematics import equivalent_struts, joint_radius
 
 
@@ -26,7 +28,6 @@ def test_whole_workspace_is_certified(name):
 @pytest.mark.parametrize("name", ALL)
 def test_bounds_hold_in_ball_arithmetic(name):
     """With 70 digits: the true solution is within `error`, and `radius` is not too large."""
-    balls = pytest.importorskip("gough.modes.balls")
     platform = gough.Platform.load(name)
     pose = poses_of(platform, 12)
     legs = gough.leg_lengths(platform, pose)
@@ -48,7 +49,6 @@ def test_bounds_hold_in_ball_arithmetic(name):
 
 def test_rounding_is_accounted_for_far_from_the_origin():
     """A machine 1e5 sizes away: struts lose five digits, and the error must say so."""
-    balls = pytest.importorskip("gough.modes.balls")
     near = gough.Platform.load("reference")
     far = np.array([1e8, -7e7, 3e7]) / 3
     platform = gough.Platform(near.base + far, near.moving, home=near.home.position + far)
@@ -70,7 +70,6 @@ def test_rounding_is_accounted_for_far_from_the_origin():
 
 def test_interval_newton_agrees():
     """The Jacobian over the whole box, entry by entry in intervals: a different bound."""
-    balls = pytest.importorskip("gough.modes.balls")
     platform = gough.Platform.load("reference")
     pose = platform.sample_poses(4, 5)
     legs = gough.leg_lengths(platform, pose)
@@ -78,11 +77,11 @@ def test_interval_newton_agrees():
     for k in range(4):
         # a cube inside half the ball of radius `radius`: intervals overestimate
         edge = proof.radius[k] / np.sqrt(3) / 2
-        assert contracts(balls, platform, legs[k], pose[k], edge)
-        assert not contracts(balls, platform, legs[k], pose[k], 1e3 * edge)
+        assert contracts(platform, legs[k], pose[k], edge)
+        assert not contracts(platform, legs[k], pose[k], 1e3 * edge)
 
 
-def contracts(balls, platform, legs, pose, edge) -> bool:
+def contracts(platform, legs, pose, edge) -> bool:
     """Whether |1 - Y DF(x)| < 1 for all x with coordinates up to `edge`, DF in intervals."""
     arb, mat = balls.arb, balls.flint.arb_mat
     moving = [[balls.acb(v) for v in row] for row in platform.moving]
@@ -123,7 +122,6 @@ def contracts(balls, platform, legs, pose, edge) -> bool:
 
 def test_small_pivots_are_noticed():
     """Where the inverse fails for want of pivoting, nothing false is claimed."""
-    balls = pytest.importorskip("gough.modes.balls")
     platform = gough.Platform.load("reference")
     pose = platform.sample_poses(60, 8)
     axis = quaternion.to_matrix(TURNS[0])[0]  # the first pivot is the first strut's part along it
@@ -131,9 +129,7 @@ def test_small_pivots_are_noticed():
     along = strut @ axis * (1 - np.logspace(-16, -1, 60))
     pose = gough.Pose(pose.position - along[:, None] * axis, pose.wxyz)
     legs = gough.leg_lengths(platform, pose)
-    alone = _bulk_with(
-        TURNS[0], platform.base[None], platform.moving, legs, pose.position, pose.wxyz
-    )
+    alone = _bounds(platform, TURNS[0], platform.base[None], legs, pose)
     proof = gough.certify(platform, legs, pose)
     assert np.sum(alone[0] == 0) > np.sum(~proof.certified)
     for k in range(60):
@@ -197,16 +193,38 @@ def test_radius_scales_with_the_unit(unit):
     platform = gough.Platform.load("reference")
     pose = platform.sample_poses(100, 2)
     legs = gough.leg_lengths(platform, pose)
-    certified, radius = certify_batch(
-        platform.base[None], platform.moving, legs, pose.position, pose.wxyz
-    )
-    other, scaled = certify_batch(
-        platform.base[None] * unit, platform.moving * unit, legs * unit,
-        pose.position * unit, pose.wxyz,
-    )  # fmt: skip
-    assert certified.all()
-    assert other.all()
-    assert np.allclose(scaled, radius * unit, rtol=1e-8)
+    home = gough.Pose(platform.home.position * unit, platform.home.wxyz)
+    scaled = gough.Platform(platform.base * unit, platform.moving * unit, home=home)
+    proof = gough.certify(platform, legs, pose)
+    other = gough.certify(scaled, legs * unit, gough.Pose(pose.position * unit, pose.wxyz))
+    assert proof.certified.all()
+    assert other.certified.all()
+    assert np.allclose(other.radius, proof.radius * unit, rtol=1e-8)
+
+
+def test_bounds_are_calculated_in_the_order_they_are_derived_in():
+    """No flag lets the compiler reorder sums: its bounds on rounding assume the written order."""
+    assert not bounds.bound_rows.targetoptions["fastmath"]
+    assert set(lanes._FLAGS) == {"contract", "nsz"}
+
+
+@pytest.mark.parametrize("name", ["reference", "reachy_mini"])
+def test_compiled_bounds_are_those_in_numpy(name):
+    """The same functions on NumPy arrays: they agree but for rounding."""
+    platform = gough.Platform.load(name)
+    pose = poses_of(platform, 5)
+    base, lengths = equivalent_struts(platform, gough.leg_lengths(platform, pose))
+    radius, error = _bounds(platform, TURNS[0], base, lengths, pose)
+    matrix = quaternion.to_matrix(TURNS[0])
+    moving = platform.moving - platform.pivot_point
+    centre, size = moving.mean(axis=0), joint_radius(platform)
+    shared = np.concatenate([TURNS[0], matrix.ravel(), (moving - centre).ravel(), centre, [size]])
+    rotated = (base - platform.pivot_point) @ matrix.T
+    z = list(np.concatenate([pose.wxyz, pose.position, rotated.reshape(-1, 18), lengths], axis=1).T)
+    z += [np.zeros(len(pose))] * (bounds.SLOTS - len(z))
+    bounds.bound(z, shared)
+    assert np.allclose(radius, z[bounds.RADIUS], rtol=1e-9)
+    assert np.allclose(error, z[bounds.ERROR], rtol=1e-9)
 
 
 def test_shapes_follow_the_batch():

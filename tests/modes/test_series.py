@@ -2,96 +2,117 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from modes.poses import poses_of
 
 import gough
+from gough.kernel import series
+from gough.kernel.ends import SCRATCH, leg_equations, refine_ends
 from gough.kernel.jit import jit
-from gough.kernel.lanes import LANES, SLOT, get, get_real, larger, put, put_real, reciprocal, root
-from gough.kernel.paths import FINITE, STUCK
+from gough.kernel.lanes import LANES, SLOT, Complexes, Reals, compiled, larger, loop
+from gough.kernel.paths import FINITE, STUCK, LegEquations, track_paths
 from gough.kernel.series import (  # fmt: skip
+    AT,
     BASE,
     BASE_RATE,
     L2,
     L2_RATE,
     ORDER,
-    SER,
-    SIZE,
+    SLOTS,
     STEP,
-    E,
     T,
+    X,
     advance,
-    evaluate,
     expand,
-    factorise,
-    substitute,
+    newton,
 )
-from gough.modes.finish import repeated
-from gough.modes.follow import Parameters, follow
-from gough.modes.monodromy import gaussian
-from gough.modes.starts import start_of
-from gough.modes.study import distances, distinct, inverse, product, rotation, squared_lengths
+from gough.kinematics import equivalent_struts, strut_vectors
+from gough.modes.frames import (
+    Frames,
+    Problem,
+    distances,
+    distinct,
+    inverse,
+    rotation,
+    squared_lengths,
+)
+from gough.modes.starts import gaussian, start_system
 
 
-@jit(cache=False)
-def arithmetic(z):
-    a, b = get(z, 0), get(z, 1)
-    put(z, 2, a * b + a * 2.0 - b * (1.0 + 2.0j))
-    put(z, 3, reciprocal(a))
-    x, y = get_real(z, 0), get_real(z, 1)
-    put_real(z, 8, larger(x, y) / (1.0 + root(x * x)))
+def run(code, z, shared):
+    """Call a function made by `compiled`."""
+    jit(cache=False)(lambda z, shared: code(z, shared))(z, shared)
+    return z
 
 
-def test_lanes_are_complex_numbers():
+def complex_arithmetic(z, shared):
+    a, b = z[0], z[1]
+    z[2] = a * b + a * 2.0 - b * shared[0] + 0.0 * b
+    z[3] = 1.0 / a - b + a.real
+    for k in loop(z, 2):
+        z[4 + k] = 2.0 * z[2 * k + 1] * shared[k]
+
+
+def real_arithmetic(z, shared):
+    a, b = z[0], z[1]
+    z[2] = larger(a, b) / (1.0 + np.sqrt(a * a)) - abs(b) * shared[1]
+    z[3] = 1.0 - a / shared[0] - -b
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"), [(complex_arithmetic, Complexes), (real_arithmetic, Reals)]
+)
+def test_traced_code_calculates_what_numpy_does(code, kind):
     rng = np.random.default_rng(0)
-    z = rng.normal(size=5 * SLOT)
-    a, b = (z[k * SLOT :][:LANES] + 1j * z[k * SLOT + LANES :][:LANES] for k in range(2))
-    x, y = z[:LANES].copy(), z[LANES : 2 * LANES].copy()
-    arithmetic(z)
-    c, d = (z[k * SLOT :][:LANES] + 1j * z[k * SLOT + LANES :][:LANES] for k in (2, 3))
-    assert np.allclose(c, a * b + 2 * a - (1 + 2j) * b)
-    assert np.allclose(d, 1 / a)
-    assert np.allclose(z[8 * LANES : 9 * LANES], np.maximum(x, y) / (1 + np.abs(x)))
+    size = SLOT if kind is Complexes else LANES
+    z, shared = rng.normal(size=8 * size), rng.normal(size=4)
+    numbers = z.view(complex) if kind is Complexes else z
+    if kind is Complexes:
+        parts = z.reshape(8, 2, LANES)
+        numbers, joints = list(parts[:, 0] + 1j * parts[:, 1]), shared.view(complex)
+    else:
+        numbers, joints = list(z.reshape(8, LANES).copy()), shared
+    code(numbers, joints)
+    out = run(compiled(code, kind), z.copy(), shared).reshape(8, -1, LANES)
+    found = out[:, 0] + 1j * out[:, 1] if kind is Complexes else out[:, 0]
+    assert np.allclose(found, numbers, rtol=1e-14, atol=1e-14)
 
 
-@jit(cache=False)
-def one_step(z, p, base_moves):
-    evaluate(z, p)
-    factorise(z)
-    substitute(z, SER)
-    for n in range(1, ORDER + 1):
-        expand(z, n, base_moves)
-    advance(z)
+def problem(seed, moves=True):
+    """Joints, a pose, squared lengths, and rates of change of lengths and base joints."""
+    rng = np.random.default_rng(seed)
+    p, base, pose = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 7)
+    squares = squared_lengths(pose, base, p)
+    return p, base, pose, squares, gaussian(rng, 6), gaussian(rng, 6, 3) * moves
 
 
-def fill(z, slot, values):
-    for k, value in enumerate(np.ravel(values)):
-        first = (slot + k) * SLOT
-        z[first : first + LANES] = value.real
-        z[first + LANES : first + SLOT] = value.imag
+def slots(pose, base, squares, rate=0.0, speed=0.0, step=0.0):
+    z = [np.zeros(1, complex) for _ in range(SLOTS)]
+    for slot, values in ((T, pose), (BASE, base), (L2, squares), (L2_RATE, np.full(6, rate)),
+                         (BASE_RATE, np.full((6, 3), speed)), (STEP, [step])):  # fmt: skip
+        for k, value in enumerate(np.ravel(values)):
+            z[slot + k] = np.array([value], complex)
+    return z
 
 
-def values(z, slot, count):
-    rows = z.reshape(-1, 2, LANES)[slot : slot + count]
-    return rows[:, 0, 0] + 1j * rows[:, 1, 0]
+def reached(z):
+    return np.array(z[T : T + 7])[:, 0]
 
 
-@pytest.mark.parametrize("base_moves", [False, True])
-def test_taylor_series_follows_the_path_to_its_order(base_moves):
+@pytest.mark.parametrize("moves", [False, True])
+def test_taylor_series_follows_the_path_to_its_order(moves):
     """Halving the step divides the error by 2^(ORDER + 1)."""
-    rng = np.random.default_rng(3)
-    p, base, e, t = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 4), gaussian(rng, 3)
-    squares = squared_lengths(e, t, base, p)
-    rate, speed = gaussian(rng, 6), gaussian(rng, 6, 3) * base_moves
+    p, base, pose, squares, rate, speed = problem(3, moves)
     errors = []
     for h in (0.05, 0.025):
-        z = np.zeros(SIZE)
-        for slot, value in ((E, e), (T, t), (BASE, base), (BASE_RATE, speed), (L2, squares),
-                            (L2_RATE, rate), (STEP, np.array([h]))):  # fmt: skip
-            fill(z, slot, np.asarray(value, dtype=complex))
-        one_step(z, p, base_moves)
-        there = squared_lengths(values(z, E, 4), values(z, T, 3), base + h * speed, p)
+        z = slots(pose, base, squares, rate, speed, h)
+        newton(z, np.ravel(p))
+        expand(z, np.ravel(p), moves)
+        advance(z, np.ravel(p))
+        there = squared_lengths(reached(z), base + h * speed, p)
         errors.append(np.abs(there - squares - h * rate).max())
     order = np.log2(errors[0] / errors[1])
     assert errors[0] < 1e-2
@@ -99,70 +120,111 @@ def test_taylor_series_follows_the_path_to_its_order(base_moves):
 
 
 def test_newton_step_is_quadratic():
-    rng = np.random.default_rng(4)
-    p, base, e, t = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 4), gaussian(rng, 3)
-    squares = squared_lengths(e, t, base, p)
+    p, base, pose, squares, *_ = problem(4)
     errors = []
     for off in (1e-3, 1e-4):
-        z = np.zeros(SIZE)
-        start = ((E, e + off), (T, t - off), (BASE, base), (L2, squares))
-        for slot, value in start:
-            fill(z, slot, np.asarray(value, dtype=complex))
-        one_step(z, p, False)
-        there = squared_lengths(values(z, E, 4), values(z, T, 3), base, p)
-        errors.append(np.abs(there - squares).max())
+        z = slots(pose + off * np.array([-1, -1, -1, 1, 1, 1, 1]), base, squares)
+        newton(z, np.ravel(p))
+        advance(z, np.ravel(p))
+        errors.append(np.abs(squared_lengths(reached(z), base, p) - squares).max())
     assert errors[1] < errors[0] / 50
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_compiled_step_is_the_one_in_numpy(moves):
+    """The same functions, traced into vector instructions, at parameters half way along."""
+    p, base, pose, squares, rate, speed = problem(11, moves)
+    z = slots(pose, base, squares, rate, speed, 0.01)
+    z[AT] = np.array([0.5 + 0j])
+    flat = np.repeat(np.array(z)[:, 0].view(float), LANES)
+    for function in (newton, partial(expand, base_moves=moves), advance):
+        function(z, np.ravel(p))
+        flat = run(compiled(function, Complexes), flat, np.ravel(p).view(float))
+    found = flat.reshape(-1, 2, LANES)
+    expected = np.array(z)[: X + 6]
+    assert np.allclose(found[: X + 6, 0] + 1j * found[: X + 6, 1], expected, rtol=1e-9, atol=1e-9)
 
 
 def test_there_and_back_again():
     """A path, and the same path backwards, return every solution to itself."""
     rng = np.random.default_rng(5)
-    p, base, e, t = (
-        gaussian(rng, 6, 3),
-        gaussian(rng, 6, 3),
-        gaussian(rng, 1, 4),
-        gaussian(rng, 1, 3),
-    )
-    here = Parameters(base, p, squared_lengths(e, t, base, p)[0])
+    p, base, pose = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 1, 7)
+    here = LegEquations(base, p, squared_lengths(pose, base, p)[0])
     squares, joints = gaussian(rng, 6) * 3, gaussian(rng, 6, 3)
-    away = follow((e, t), here, squares[None], joints[None])
-    back = follow(away.finite(), Parameters(joints, p, squares), here.squares[None], base[None])
-    assert distances((e, t), back.finite()).max() < 1e-8
+    away = track_paths(pose, here, squares[None], joints[None])
+    there = LegEquations(joints, p, squares)
+    back = track_paths(away.finite(), there, here.squares[None], base[None])
+    assert distances(pose, back.finite()).max() < 1e-8
 
 
 def test_complex_rotations_preserve_dots():
-    e = gaussian(np.random.default_rng(6), 4)
-    r = rotation(e)
+    a, b = gaussian(np.random.default_rng(6), 2, 7)
+    r = rotation(a)
     assert np.allclose(r @ r.T, np.eye(3))
-    f = gaussian(np.random.default_rng(7), 4)
-    assert np.allclose(rotation(product(e, f)), r @ rotation(f))
+    both = np.append(np.zeros(3), gough.quaternion.product(a[3:], b[3:]))
+    assert np.allclose(rotation(both), r @ rotation(b))
 
 
 def test_inverse_exchanges_base_and_platform():
-    rng = np.random.default_rng(8)
-    p, base, e, t = gaussian(rng, 6, 3), gaussian(rng, 6, 3), gaussian(rng, 4), gaussian(rng, 3)
-    assert np.allclose(squared_lengths(e, t, base, p), squared_lengths(*inverse(e, t), p, base))
+    p, base, pose, *_ = problem(8)
+    assert np.allclose(squared_lengths(pose, base, p), squared_lengths(inverse(pose), p, base))
+
+
+@pytest.mark.parametrize("name", ["rubin_simulink", "reachy_mini", "nasa_msfc"])
+def test_leg_equations_are_the_struts(name):
+    """What the compiled refinement repeats, against `gough.struts`, in normalised units."""
+    platform = gough.Platform.load(name)
+    pose = poses_of(platform, 1)
+    frames = Frames.of(platform)
+    legs = gough.leg_lengths(platform, pose)
+    one = Problem.of(frames, *equivalent_struts(platform, legs))
+    a, x = np.empty((6, 6)), np.empty(6)
+    worst = leg_equations(one.moving, one.base[0], one.squares[0], frames.normalise(pose)[0], a, x)
+    assert worst == np.abs(x).max() < 1e-13
+    rods = (
+        strut_vectors(platform, pose)[0] + platform.base - equivalent_struts(platform, legs)[0][0]
+    )
+    assert np.allclose(
+        np.linalg.norm(a[:, :3], axis=1), np.linalg.norm(rods, axis=1) / frames.scale
+    )
+    back = frames.denormalise(frames.normalise(pose))
+    assert np.allclose(back.matrix, pose.matrix, atol=1e-12 * platform.size)
 
 
 def test_steps_far_too_long_are_taken_back():
     """Even at 1.5 radii of convergence a step, paths arrive, and none jumps to another's end."""
     platform = gough.Platform.load("dietmaier")
-    start = start_of(platform)
+    start = start_system(platform)
     legs = gough.leg_lengths(platform, poses_of(platform, 60))
     squares = start.frames.squares(legs).astype(complex)
-    ends = follow((start.e, start.t), start.at, squares, share=1.5)
-    assert np.mean(ends.ends == FINITE) > 0.99
+    ends = track_paths(start.poses, start.at, squares, share=1.5)
+    assert np.mean(ends.how == FINITE) > 0.99
     for k in range(60):
-        e, t = ends.finite(k)
-        assert len(distinct(e, t, 1e-6)) == len(e)
+        poses = ends.finite(k)
+        assert len(distinct(poses, 1e-6)) == len(poses)
 
 
 def test_shared_ends_are_seen():
     rng = np.random.default_rng(9)
-    e, t = gaussian(rng, 5, 4), gaussian(rng, 5, 3)
-    arrived = np.full(5, FINITE, np.uint8)
-    assert not repeated(e, t, arrived)
-    e[3], t[3] = e[1] * (0.3 - 2.0j), t[1] + 1e-9  # a quaternion's factor does not matter
-    assert repeated(e, t, arrived)
-    arrived[3] = STUCK
-    assert not repeated(e, t, arrived)
+    ends, how = gaussian(rng, 1, 5, 7), np.full((1, 5), FINITE, np.uint8)
+    joints = rng.normal(size=(2, 6, 3))
+
+    def shared():
+        found = np.zeros(1, bool)
+        refine_ends(
+            joints[0], joints[1:], np.ones((1, 6)), ends, how, np.zeros((1, 5, 7)),
+            np.zeros((1, 5), np.uint8), found, np.zeros(SCRATCH),
+        )  # fmt: skip
+        return found[0]
+
+    assert not shared()
+    ends[0, 3, 3:] = ends[0, 1, 3:] * (0.3 - 2.0j)  # a quaternion's factor does not matter
+    ends[0, 3, :3] = ends[0, 1, :3] + 1e-9
+    assert shared()
+    how[0, 3] = STUCK
+    assert not shared()
+
+
+def test_series_needs_no_compiler():
+    """The mathematics is plain Python: no decorator of Numba stands in its module."""
+    assert not any(hasattr(value, "py_func") for value in vars(series).values())

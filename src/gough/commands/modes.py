@@ -26,7 +26,7 @@ def run(
     platform: PlatformName,
     out: Annotated[str | None, arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")] = None,
     plot: Annotated[str | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    threads: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    workers: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
 ) -> int:
     """Every pose that leg readings allow, each with its proof.
 
@@ -42,7 +42,7 @@ def run(
         out: file to write, .csv or .parquet, one row for each pose; or - for CSV on standard
             output.
         plot: .png, .svg or .pdf to draw all poses of the first set of readings in.
-        threads: at most so many.
+        workers: number of threads; all cores unless given.
     """
     from gough.commands import show
     from gough.modes.assembly import assembly_modes
@@ -51,7 +51,7 @@ def run(
 
     machine = Platform.load(platform)
     draw = None if plot is None else _painter(plot)
-    modes = assembly_modes(machine, readings(legs, machine, platform), threads=threads)
+    modes = assembly_modes(machine, readings(legs, machine, platform), workers=workers)
     choice = choose_mode(modes)
     _print(modes, choice, show.console_beside(out))
     if out is not None:

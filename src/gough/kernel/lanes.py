@@ -1,288 +1,215 @@
-"""Eight complex numbers that Numba adds and multiplies as one, in vector instructions.
+"""Eight numbers at once: arithmetic written in Python, traced into vector instructions.
 
-Inside compiled functions `get(z, slot)` reads the eight complex numbers of a slot of a flat
-float64 array, real parts before imaginary ones, and `put` writes them; between the two they
-are values with +, - and * (by lanes, or by a number that all lanes share). LLVM cannot be
-talked into this by loops over arrays, since it must assume that slots overlap: for the 6x6
-factorisation, loops took 79 ns a lane and these values take 22.
+A function of (z, shared) that calculates with the slots of `z` becomes a function of compiled
+code by `compiled`: Numba calls it once, with `z` and `shared` standing for two flat float64
+arrays, and every + - * / on what it reads emits one LLVM instruction for eight numbers. Its
+loops and conditions run at that time and leave no trace. So the mathematics is plain Python,
+which tests run on NumPy arrays too; nothing is inferred or optimised statement by statement,
+which is what Numba spends its time on; and the order of operations is the source's, but for
+products and sums that become one fused instruction with one rounding in place of two.
 
-LLVM splits the vectors of eight into what the processor has (AVX-512, AVX2, NEON).
+Slot k of an array of reals is its entries 8 k to 8 k + 7. A slot of complex numbers is two of
+those, real parts before imaginary ones. LLVM splits vectors of eight into what the processor has
+(AVX-512, AVX2, NEON).
 """
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
-from typing import Any, cast
+from collections.abc import Callable, Iterator
+from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import intrinsic
 
 LANES = 8
-SLOT = 2 * LANES  # doubles per slot
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+SLOT = 2 * LANES  # doubles in a slot of complex numbers
+_DOUBLE = ir.DoubleType()
+_VECTOR = ir.VectorType(_DOUBLE, LANES)
 _FLAGS = ("contract", "nsz")
 
 
-def _builtin(function: Callable) -> Callable[..., Any]:
-    """A function of compiled code; its first parameter and its types are Numba's affair."""
-    return intrinsic(function)
+class Reals:
+    """Eight real numbers: an LLVM vector, and the builder that emits what is done with it."""
 
+    def __init__(self, builder: Any, value: Any) -> None:
+        self.builder, self.value = builder, value
 
-class LanesType(types.Type):
-    """Numba's type of eight complex numbers."""
+    def _emit(self, instruction: str, a: Any, b: Any) -> Any:
+        if isinstance(a, Complexes) or isinstance(b, Complexes):
+            return NotImplemented  # which knows how to
+        a, b = (
+            x.value if isinstance(x, Reals) else ir.Constant(_VECTOR, [float(x)] * LANES)
+            for x in (a, b)
+        )
+        return Reals(self.builder, getattr(self.builder, instruction)(a, b, flags=_FLAGS))
 
-    def __init__(self) -> None:
-        super().__init__(name="ComplexLanes8")
+    def __add__(self, other):
+        return self._emit("fadd", self, other)
 
+    def __sub__(self, other):
+        return self._emit("fsub", self, other)
 
-class _VectorType(types.Type):
-    def __init__(self) -> None:
-        super().__init__(name="RealLanes8")
+    def __mul__(self, other):
+        return self._emit("fmul", self, other)
 
+    def __truediv__(self, other):
+        return self._emit("fdiv", self, other)
 
-lanes = LanesType()
-_vector = _VectorType()
+    def __rsub__(self, other):
+        return self._emit("fsub", other, self)
 
+    def __rtruediv__(self, other):
+        return self._emit("fdiv", other, self)
 
-@register_model(_VectorType)
-class _VectorModel(models.PrimitiveModel):
-    def __init__(self, dmm, fe_type) -> None:
-        super().__init__(dmm, fe_type, _VECTOR)
+    __radd__, __rmul__ = __add__, __mul__
 
+    def __neg__(self):
+        return Reals(self.builder, self.builder.fneg(self.value))
 
-@register_model(LanesType)
-class _LanesModel(models.StructModel):
-    def __init__(self, dmm, fe_type) -> None:
-        super().__init__(dmm, fe_type, [("re", _vector), ("im", _vector)])
+    def __abs__(self):
+        return self._call("fabs")
 
+    def sqrt(self):
+        """Square roots; NumPy's `sqrt` calls this."""
+        return self._call("sqrt")
 
-def _make(context, builder, re, im):
-    value = cgutils.create_struct_proxy(lanes)(context, builder)
-    value.re, value.im = re, im
-    return value._getvalue()
+    def larger(self, other):
+        """The larger of each two; `other` where they do not compare."""
+        above = self.builder.fcmp_ordered(">", self.value, other.value)
+        return Reals(self.builder, self.builder.select(above, self.value, other.value))
 
-
-def _parts(context, builder, value):
-    proxy = cgutils.create_struct_proxy(lanes)(context, builder, value=value)
-    return proxy.re, proxy.im
-
-
-def _splat(builder, scalar):
-    """A vector of eight times the same double."""
-    zero = ir.Constant(ir.IntType(32), 0)
-    one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), scalar, zero)
-    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(one, ir.Constant(_VECTOR, ir.Undefined), mask)
-
-
-class _Arithmetic(AbstractTemplate):
-    def generic(self, args, kws):
-        for kind, scalars in (
-            (lanes, (types.float64, types.complex128)),
-            (_vector, (types.float64,)),
-        ):
-            if len(args) == 2 and kind in args and all(a == kind or a in scalars for a in args):
-                return signature(kind, *args)
-        return None
-
-
-for _op in (operator.add, operator.sub, operator.mul, operator.truediv):
-    cast(Any, infer_global)(_op)(type(f"_{_op.__name__}", (_Arithmetic,), {}))
-
-
-def _real(instruction: str):
-    """Lower an instruction for vectors of eight reals, either of which may be one double."""
-
-    def lower(context, builder, sig, args):
-        pairs = zip(sig.args, args, strict=True)
-        a, b = (v if kind == _vector else _splat(builder, v) for kind, v in pairs)
-        return getattr(builder, instruction)(a, b, flags=_FLAGS)
-
-    return lower
-
-
-for _op, _name in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
-    for _kinds in ((_VectorType,) * 2, (_VectorType, types.Float), (types.Float, _VectorType)):
-        lower_builtin(getattr(operator, _op), *_kinds)(_real(_name))
-
-
-def _add(context, builder, sig, args):
-    (ar, ai), (br, bi) = (_parts(context, builder, v) for v in args)
-    return _make(context, builder, builder.fadd(ar, br, _FLAGS), builder.fadd(ai, bi, _FLAGS))
-
-
-def _sub(context, builder, sig, args):
-    (ar, ai), (br, bi) = (_parts(context, builder, v) for v in args)
-    return _make(context, builder, builder.fsub(ar, br, _FLAGS), builder.fsub(ai, bi, _FLAGS))
-
-
-def _mul(context, builder, sig, args):
-    (ar, ai), (br, bi) = (_parts(context, builder, v) for v in args)
-
-    def mul(a, b):
-        return builder.fmul(a, b, _FLAGS)
-
-    re = builder.fsub(mul(ar, br), mul(ai, bi), _FLAGS)
-    im = builder.fadd(mul(ar, bi), mul(ai, br), _FLAGS)
-    return _make(context, builder, re, im)
-
-
-def _scale(context, builder, sig, args):
-    value, scalar = args if sig.args[0] == lanes else args[::-1]
-    re, im = _parts(context, builder, value)
-    factor = _splat(builder, scalar)
-    re, im = builder.fmul(re, factor, _FLAGS), builder.fmul(im, factor, _FLAGS)
-    return _make(context, builder, re, im)
-
-
-def _scale_complex(context, builder, sig, args):
-    scalar, value = args if sig.args[1] == lanes else args[::-1]
-    number = context.make_complex(builder, types.complex128, value=scalar)
-    shared = _make(context, builder, _splat(builder, number.real), _splat(builder, number.imag))
-    return _mul(context, builder, sig, (shared, value))
-
-
-lower_builtin(operator.add, LanesType, LanesType)(_add)
-lower_builtin(operator.sub, LanesType, LanesType)(_sub)
-lower_builtin(operator.mul, LanesType, LanesType)(_mul)
-lower_builtin(operator.mul, LanesType, types.Float)(_scale)
-lower_builtin(operator.mul, types.Float, LanesType)(_scale)
-lower_builtin(operator.mul, LanesType, types.Complex)(_scale_complex)
-lower_builtin(operator.mul, types.Complex, LanesType)(_scale_complex)
-
-
-def _pointers(context, builder, array_type, array, slot):
-    """Addresses of the real and the imaginary parts of a slot."""
-    data = context.make_array(array_type)(context, builder, array).data
-    out = []
-    for part in range(2):
-        first = builder.add(builder.mul(slot, slot.type(SLOT)), slot.type(part * LANES))
-        address = builder.gep(data, [first])
-        out.append(builder.bitcast(address, _VECTOR.as_pointer()))
-    return out
-
-
-@_builtin
-def get(typingctx, z, slot):
-    """The eight complex numbers in a slot of the flat float64 array z."""
-
-    def codegen(context, builder, sig, args):
-        pointers = _pointers(context, builder, sig.args[0], *args)
-        re, im = (builder.load(p, align=8) for p in pointers)
-        return _make(context, builder, re, im)
-
-    return lanes(z, types.int64), codegen
-
-
-@_builtin
-def put(typingctx, z, slot, value):
-    """Write eight complex numbers to a slot of the flat float64 array z."""
-
-    def codegen(context, builder, sig, args):
-        pointers = _pointers(context, builder, sig.args[0], args[0], args[1])
-        for part, pointer in zip(_parts(context, builder, args[2]), pointers, strict=True):
-            builder.store(part, pointer, align=8)
-        return context.get_dummy_value()
-
-    return types.void(z, types.int64, lanes), codegen
-
-
-@_builtin
-def reciprocal(typingctx, value):
-    """1 / value in every lane."""
-
-    def codegen(context, builder, sig, args):
-        re, im = _parts(context, builder, args[0])
-        square = builder.fadd(builder.fmul(re, re, _FLAGS), builder.fmul(im, im, _FLAGS), _FLAGS)
-        over = builder.fdiv(_splat(builder, ir.Constant(ir.DoubleType(), 1.0)), square)
-        minus = builder.fneg(over)
-        return _make(context, builder, builder.fmul(re, over), builder.fmul(im, minus))
-
-    return lanes(lanes), codegen
-
-
-@_builtin
-def zero(typingctx):
-    """Eight zeros."""
-
-    def codegen(context, builder, sig, args):
-        nought = ir.Constant(_VECTOR, [0.0] * LANES)
-        return _make(context, builder, nought, nought)
-
-    return lanes(), codegen
-
-
-@_builtin
-def ones(typingctx):
-    """Eight ones."""
-
-    def codegen(context, builder, sig, args):
-        re, im = (ir.Constant(_VECTOR, [value] * LANES) for value in (1.0, 0.0))
-        return _make(context, builder, re, im)
-
-    return lanes(), codegen
-
-
-@_builtin
-def get_real(typingctx, z, slot):
-    """Eight real numbers: entries 8 slot to 8 slot + 7 of the flat float64 array z."""
-
-    def codegen(context, builder, sig, args):
-        return builder.load(_real_pointer(context, builder, sig.args[0], *args), align=8)
-
-    return _vector(z, types.int64), codegen
-
-
-@_builtin
-def put_real(typingctx, z, slot, value):
-    """Write eight real numbers to entries 8 slot to 8 slot + 7 of the flat float64 array z."""
-
-    def codegen(context, builder, sig, args):
-        pointer = _real_pointer(context, builder, sig.args[0], args[0], args[1])
-        builder.store(args[2], pointer, align=8)
-        return context.get_dummy_value()
-
-    return types.void(z, types.int64, _vector), codegen
-
-
-def _real_pointer(context, builder, array_type, array, slot):
-    data = context.make_array(array_type)(context, builder, array).data
-    first = builder.mul(slot, slot.type(LANES))
-    return builder.bitcast(builder.gep(data, [first]), _VECTOR.as_pointer())
-
-
-@_builtin
-def root(typingctx, value):
-    """Square roots of eight reals."""
-    return _vector(_vector), _llvm("sqrt")
-
-
-@_builtin
-def magnitude(typingctx, value):
-    """Absolute values of eight reals."""
-    return _vector(_vector), _llvm("fabs")
-
-
-def _llvm(name: str):
-    """Code that calls one of LLVM's functions of eight reals."""
-
-    def codegen(context, builder, sig, args):
+    def _call(self, name: str) -> Reals:
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
         full = f"llvm.{name}.v{LANES}f64"
-        function = cgutils.get_or_insert_function(builder.module, kind, full)
-        return builder.call(function, args)
-
-    return codegen
+        function = cgutils.get_or_insert_function(self.builder.module, kind, full)
+        return Reals(self.builder, self.builder.call(function, [self.value]))
 
 
-@_builtin
-def larger(typingctx, a, b):
-    """The larger of each two of eight reals; b where they do not compare."""
+class Complexes:
+    """Eight complex numbers. A term that is the number 0 emits nothing."""
 
-    def codegen(context, builder, sig, args):
-        return builder.select(builder.fcmp_ordered(">", *args), *args)
+    def __init__(self, real: Reals, imag: Reals) -> None:
+        self.real, self.imag = real, imag
 
-    return _vector(_vector, _vector), codegen
+    def __add__(self, other):
+        if isinstance(other, Complexes):
+            return Complexes(self.real + other.real, self.imag + other.imag)
+        return self if other == 0 else Complexes(self.real + other, self.imag)
+
+    def __sub__(self, other):
+        if isinstance(other, Complexes):
+            return Complexes(self.real - other.real, self.imag - other.imag)
+        return self + -other
+
+    def __rsub__(self, other):
+        return self * -1.0 + other
+
+    def __mul__(self, other):
+        if isinstance(other, Complexes):
+            real = self.real * other.real - self.imag * other.imag
+            return Complexes(real, self.real * other.imag + self.imag * other.real)
+        return other if other == 0 else Complexes(self.real * other, self.imag * other)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __rtruediv__(self, number):
+        over = number / (self.real * self.real + self.imag * self.imag)
+        return Complexes(self.real * over, self.imag * over * -1.0)
+
+
+class _Slots:
+    """A flat array seen as slots of eight real or complex numbers.
+
+    Args:
+        shared: each number stands alone in the array, and is read into all eight lanes.
+    """
+
+    def __init__(self, builder, data, kind: type, shared: bool) -> None:
+        self.builder, self.data, self.kind, self.shared = builder, data, kind, shared
+
+    def __getitem__(self, slot: int | _Index) -> Any:
+        if self.kind is Reals:
+            return self._load(slot)
+        return Complexes(self._load(2 * slot), self._load(2 * slot + 1))
+
+    def __setitem__(self, slot: int, value: Any) -> None:
+        parts = [value] if self.kind is Reals else [value.real, value.imag]
+        for k, part in enumerate(parts):
+            self.builder.store(part.value, self._address(len(parts) * slot + k), align=8)
+
+    def _load(self, k: int | _Index) -> Reals:
+        if not self.shared:
+            return Reals(self.builder, self.builder.load(self._address(k), align=8))
+        number = self.builder.load(self._pointer(k, 1))
+        first, undefined = ir.Constant(ir.IntType(32), 0), ir.Constant(_VECTOR, ir.Undefined)
+        one = self.builder.insert_element(undefined, number, first)
+        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+        return Reals(self.builder, self.builder.shuffle_vector(one, undefined, everywhere))
+
+    def _address(self, k: int | _Index) -> Any:
+        return self.builder.bitcast(self._pointer(k, LANES), _VECTOR.as_pointer())
+
+    def _pointer(self, k: int | _Index, size: int) -> Any:
+        """Where entry k * size of the array is."""
+        if isinstance(k, _Index):
+            place = self.builder.mul(k.value, k.value.type(k.scale * size))
+            place = self.builder.add(place, place.type(k.offset * size))
+        else:
+            place = ir.IntType(64)(k * size)
+        return self.builder.gep(self.data, [place])
+
+
+class _Index:
+    """The index of a loop of the machine's, times a number, plus another."""
+
+    def __init__(self, value: Any, scale: int = 1, offset: int = 0) -> None:
+        self.value, self.scale, self.offset = value, scale, offset
+
+    def __add__(self, number: int) -> _Index:
+        return _Index(self.value, self.scale, self.offset + number)
+
+    def __mul__(self, number: int) -> _Index:
+        return _Index(self.value, self.scale * number, self.offset * number)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def loop(z: Any, count: int) -> Iterator[Any]:
+    """The numbers 0 to count - 1; in traced code as a loop of the machine's, not unrolled."""
+    if not isinstance(z, _Slots):
+        yield from range(count)
+        return
+    with cgutils.for_range(z.builder, ir.IntType(64)(count)) as running:
+        yield _Index(running.index)
+
+
+def compiled(function: Callable[[Any, Any], None], kind: type) -> Callable[..., None]:
+    """Return `function` as a function of compiled code.
+
+    Args:
+        function: of z and shared, both indexed by slots; it writes its results into z.
+        kind: `Reals` or `Complexes`, what a slot holds.
+
+    Returns:
+        A function of two contiguous float64 arrays, for use in jitted functions.
+    """
+
+    def typed(typingctx, z, shared):
+        def codegen(context, builder, sig, args):
+            arrays = [
+                context.make_array(array)(context, builder, value).data
+                for array, value in zip(sig.args, args, strict=True)
+            ]
+            function(*(_Slots(builder, data, kind, k == 1) for k, data in enumerate(arrays)))
+            return context.get_dummy_value()
+
+        return types.void(z, shared), codegen
+
+    return intrinsic(typed)
+
+
+def larger(a: Any, b: Any) -> Any:
+    """The larger of each two numbers; b where they do not compare."""
+    return a.larger(b) if isinstance(a, Reals) else np.where(a > b, a, b)

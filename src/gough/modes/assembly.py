@@ -1,283 +1,291 @@
-"""Every assembly mode of a hexapod: all real poses that six readings allow."""
+"""Every assembly mode of a hexapod: all real poses that six readings allow.
+
+    start_system -> track_paths -> refine_real_ends -> resolve_singular -> certify -> AssemblyModes
+
+All steps between the readings and the certificate work on one normalised `Problem`. Sets of
+readings whose paths all arrive apart are done after `refine_real_ends`; the others are tracked
+again, and what still does not arrive belongs to singular poses.
+"""
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough.certificate import certify
+from gough.certificate import certify_struts
 from gough.checks import Array
-from gough.kernel.paths import FINITE, LOST
+from gough.kernel.ends import BEYOND, DOUBTFUL, OPEN, REAL, SAME, SCRATCH, refine_ends
+from gough.kernel.paths import LOST, SHARE, STUCK, Ends, track_paths
 from gough.kernel.threads import cores
 from gough.kinematics import equivalent_struts
-from gough.modes.finish import DOUBTFUL, REAL, SAME, finish_rows, is_far
-from gough.modes.follow import SHARE, Ends, follow
-from gough.modes.frames import Frames
-from gough.modes.result import AssemblyModes
-from gough.modes.singular import Problem, classify, curve_of_poses, gather, merge
-from gough.modes.starts import SEED, Start, start_of
-from gough.modes.study import distinct
+from gough.modes.frames import Problem, distinct
+from gough.modes.result import AssemblyModes, struts_of_sets
+from gough.modes.singular import Legs, classify, curve_of_poses, merge, poses_near
+from gough.modes.starts import SEED, StartSystem, start_system
 from gough.platform import Platform
 from gough.status import ModesStatus
-from gough.tables import Table, TableInfo, as_readings, table_info
+from gough.tables import Table, as_readings, table_info
 
 CHUNK = 128  # sets of readings per task
-# What readings whose paths do not all arrive apart are tried with: the share of the radius of
-# convergence that a step takes, and which of the machine's start systems.
+# Tries for readings whose paths do not all arrive apart: the share of the radius of convergence
+# that a step takes, and which of the machine's start systems.
 AGAIN = ((0.2, 0), (0.3, 1), (0.3, 2), (0.1, 3))
 DISTANT = 1e3  # normalised: starts beyond belong to no pose, where the base joints are fixed
-TOLERANCE = 1e-11  # normalised: largest |l^2 - d.d| / 2 of a pose that has the legs
 
 
 def assembly_modes(
-    platform: Platform, legs: ArrayLike | Table, *, threads: int | None = None
+    platform: Platform, legs: ArrayLike | Table, *, workers: int | None = None
 ) -> AssemblyModes:
     """All real poses for leg readings, each with a certificate, and whether the list is complete.
 
     All complex solutions are tracked from the machine's start system (found on its first use,
     some hundredths of a second), so nothing depends on a guess. The same call gives the same
-    bits, whatever the number of threads and whatever other readings are beside.
+    bits, whatever the number of workers and whatever other readings are beside.
 
     Args:
-        legs: readings (6,) or (N, 6) of any kind of leg, or a table as for `solve`.
-        threads: at most so many; all the process may use if None.
+        legs: readings (..., 6) of any kind of leg, or a table as for `solve`.
+        workers: number of threads; all cores unless given.
+
+    Returns:
+        The poses of all sets of readings. Sets with NaN, infinity or a length not above 0 have
+        no poses and the status INVALID_INPUT.
 
     Raises:
-        GoughError: legs of another shape, or not numbers. Rows with NaN or infinity are
-            answered with no poses and the status INVALID_INPUT.
+        GoughError: legs of another shape, or not numbers.
+
+    Example:
+        >>> import gough
+        >>> platform = gough.Platform.load("dietmaier")
+        >>> gough.assembly_modes(platform, platform.home_legs)
+        AssemblyModes(40 poses, complete)
     """
     readings = as_readings(legs)
-    rows = readings.reshape(-1, 6)
-    start = start_of(platform)
-    base, lengths = equivalent_struts(platform, rows)
-    valid = np.all(np.isfinite(rows), axis=1) & np.all(lengths > 0, axis=1)
-    work = _Work(platform, start, base if platform.rotary is not None else base[:1], lengths)
-    outcome = _Outcome.empty(len(rows))
-    outcome.status[~valid] = ModesStatus.INVALID_INPUT
-    todo = np.flatnonzero(valid)
+    base, lengths = equivalent_struts(platform, readings.reshape(-1, 6))
+    struts = base if platform.rotary is not None else platform.base[None], lengths
+    start = start_system(platform)
+    problem = Problem.of(start.frames, *struts)
+    sets = np.flatnonzero(problem.valid)
     if start.singular:
-        _curves(platform, work, todo, outcome)
+        home = start.frames.normalise(platform.home)
+        answers = [sample_curve(problem, k, home) for k in sets]
     else:
-        _run(work, todo, outcome, threads)
-    return _assemble(platform, readings, start, outcome, table_info(legs))
+        answers = find_poses(platform, problem, sets, workers)
+    found = Answer.join(len(lengths), answers)
+    pose = start.frames.denormalise(found.poses)
+    translation, rotation = pose.distance(platform.home)
+    order = np.lexsort((translation / platform.size + rotation, found.row))
+    row, pose = found.row[order], pose[order]
+    proof = certify_struts(platform, *struts_of_sets(struts, row), pose)
+    status, paths, multiplicity = settle_doubts(found, order, proof.certified, start.count)
+    batch = readings.shape[:-1]
+    return AssemblyModes(
+        platform=platform, legs=readings, pose=pose, row=row, multiplicity=multiplicity,
+        certificate=proof, status=status.reshape(batch), paths=paths.reshape(*batch, 4),
+        solutions=start.count, struts=struts, table=table_info(legs),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class _Work:
-    """Readings in the platform's units, to be tracked from `start`."""
-
-    platform: Platform
-    start: Start
-    base: Array  # (N or 1, 6, 3)
-    lengths: Array  # (N, 6)
-
-    def normalised(self, rows: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Base joints (n or 1, 6, 3) and squared lengths (n, 6) of some rows."""
-        frames: Frames = self.start.frames
-        base = self.base if len(self.base) == 1 else self.base[rows]
-        return frames.base(base), frames.squares(self.lengths[rows])
-
-
-@dataclass(frozen=True, eq=False)
-class _Outcome:
-    """Per row: status, counts of paths. Poses come in blocks, in any order of rows.
+class Answer:
+    """Real poses of n sets of readings, M in all.
 
     Attributes:
-        status: (N,); paths: (N, 4) real, complex, at infinity, singular.
-        blocks: rows (M,), normalised real poses (M, 4) and (M, 3), multiplicities (M,).
+        sets: (n,) the numbers of the sets.
+        status: (n,) of `ModesStatus`.
+        paths: (n, 4): how many of the complex solutions are real, are complex, went to
+            infinity, met in multiple ones.
+        row: (M,) the set that a pose belongs to.
+        poses: (M, 7) normalised, see `gough.modes.frames`.
+        multiplicity: (M,) 1, or more where solutions meet, or 0 on a curve of poses.
     """
 
+    sets: NDArray[np.int64]
     status: NDArray[np.uint8]
     paths: NDArray[np.int32]
-    blocks: list[tuple[NDArray[np.int64], Array, Array, NDArray[np.int32]]]
+    row: NDArray[np.int64]
+    poses: Array
+    multiplicity: NDArray[np.int32]
 
     @classmethod
-    def empty(cls, count: int) -> _Outcome:
-        nothing = np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros(0, np.int32)
-        return cls(np.zeros(count, np.uint8), np.zeros((count, 4), np.int32), [nothing])
+    def one(
+        cls, k: int, status: int, paths: list[int], poses: Array, multiplicity: Array
+    ) -> Answer:
+        """The answer for set k."""
+        row = np.full(len(poses), k)
+        return cls(np.array([k]), np.array([status]), np.array([paths]), row, poses, multiplicity)
 
-    def add(self, rows: NDArray[np.int64], e: Array, t: Array, multiple: NDArray[np.int32]) -> None:
-        """Poses of some rows; a row's poses must come in one call."""
-        self.blocks.append((rows, e, t, multiple))
+    @classmethod
+    def join(cls, count: int, answers: list[Answer]) -> Answer:
+        """The answer for all of `count` sets; sets without one are invalid."""
+        status = np.full(count, ModesStatus.INVALID_INPUT, np.uint8)
+        paths = np.zeros((count, 4), np.int32)
+        for one in answers:
+            status[one.sets], paths[one.sets] = one.status, one.paths
+        row = np.concatenate([np.zeros(0, np.int64), *(one.row for one in answers)])
+        poses = np.concatenate([np.zeros((0, 7)), *(one.poses for one in answers)])
+        multiplicity = np.concatenate([np.zeros(0, np.int32), *(a.multiplicity for a in answers)])
+        return cls(np.arange(count), status, paths, row, poses, multiplicity)
 
 
-def _run(work: _Work, rows: NDArray[np.int64], outcome: _Outcome, threads: int | None) -> None:
-    """Fill `outcome` for `rows`, in chunks on threads; rows that are not clean are done again."""
-    chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
-    workers = min(len(chunks), threads or cores())
+def find_poses(
+    platform: Platform, problem: Problem, sets: NDArray[np.int64], workers: int | None
+) -> list[Answer]:
+    """Answers for some sets of a problem, on threads."""
+    start = start_system(platform)
 
-    def run(chunk: NDArray[np.int64]) -> NDArray[np.int64]:
-        return _solve(work, chunk, outcome)
+    def run(chunk: NDArray[np.int64]) -> tuple[Answer, NDArray[np.int64]]:
+        ends = refine_real_ends(problem[chunk], start, SHARE, careful=False)
+        return ends.regular(chunk), chunk[~ends.clean]
 
+    chunks = [sets[k : k + CHUNK] for k in range(0, len(sets), CHUNK)]
+    workers = min(len(chunks), workers or cores())
     if workers <= 1:
-        left = [run(chunk) for chunk in chunks]
+        done = [run(chunk) for chunk in chunks]
     else:
         with ThreadPoolExecutor(workers) as pool:
-            left = list(pool.map(run, chunks))
-    for row in np.concatenate([*left, np.zeros(0, np.int64)]).astype(int):
-        _solve_again(work, row, outcome)
-
-
-def _track(work: _Work, rows: NDArray[np.int64], start: Start, share: float) -> _Tracked:
-    """Paths from `start` to some rows, and their real ends."""
-    base, squares = work.normalised(rows)
-    moves = base.astype(complex) if start.base_moves else None
-    ends = follow((start.e, start.t), start.at, squares.astype(complex), moves, share=share)
-    shape = ends.ends.shape
-    e, t, kind = np.zeros((*shape, 4)), np.zeros((*shape, 3)), np.zeros(shape, np.uint8)
-    away, clean = np.zeros(shape, np.bool_), np.zeros(len(rows), np.bool_)
-    distant = np.abs(start.t).max(axis=1, initial=0.0) > DISTANT
-    finish_rows(
-        start.frames.moving, np.ascontiguousarray(base), np.ascontiguousarray(squares), ends.e,
-        ends.t, ends.ends, distant & (not start.base_moves), share < SHARE, TOLERANCE,
-        e, t, kind, away, clean,
-    )  # fmt: skip
-    return _Tracked(start, ends, e, t, kind, away, clean)
+            done = list(pool.map(run, chunks))
+    answers = [answer for answer, _ in done]
+    return answers + [track_again(platform, problem, k) for _, left in done for k in left]
 
 
 @dataclass(frozen=True, eq=False)
-class _Tracked:
-    """Ends of the P paths of n rows, and what `finish_rows` makes of them."""
+class RealEnds:
+    """Ends of the P paths to n sets of readings, and the real poses among them.
 
-    start: Start
+    Attributes:
+        start: where the paths began.
+        ends: where they ended.
+        poses: (n, P, 7) the real poses, where `kind` is REAL.
+        kind: (n, P) see `gough.kernel.ends`.
+        away: (n, P) paths that went to infinity.
+        clean: (n,) all other paths arrived, apart from each other and without doubt.
+    """
+
+    start: StartSystem
     ends: Ends
-    e: Array  # (n, P, 4) the real poses
-    t: Array
-    kind: NDArray[np.uint8]  # (n, P)
+    poses: Array
+    kind: NDArray[np.uint8]
     away: NDArray[np.bool_]
-    clean: NDArray[np.bool_]  # (n,)
+    clean: NDArray[np.bool_]
 
-    def record(self, outcome: _Outcome, rows: NDArray[np.int64]) -> None:
-        """Poses of the clean rows, with mirror images; `rows` (n,) are their places among all."""
-        start, good = self.start, self.clean
-        real = (self.kind == REAL) & good[:, None]
-        where, e, t = np.broadcast_to(rows[:, None], real.shape)[real], self.e[real], self.t[real]
+    def regular(self, sets: NDArray[np.int64]) -> Answer:
+        """The answer for the clean ones of the sets (n,), mirror images included."""
+        start, clean = self.start, self.clean
+        real = (self.kind == REAL) & clean[:, None]
+        row, poses = np.broadcast_to(sets[:, None], real.shape)[real], self.poses[real]
         count, away = real.sum(axis=1), self.away.sum(axis=1)
         if start.paired:
-            mirrored = start.frames.reflect(e, t)
-            where = np.concatenate([where, where])
-            e, t = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
+            row, poses = np.concatenate([row, row]), with_mirror_images(start, poses)
             count, away = 2 * count, 2 * away
-        outcome.add(where, e, t, np.ones(len(e), np.int32))
-        paths = [count, start.count - count - away, away, 0 * away]
-        outcome.paths[rows[good]] = np.stack(paths, axis=1)[good]
-        outcome.status[rows[good]] = ModesStatus.COMPLETE
-
-    def beyond(self, squares: Array) -> NDArray[np.bool_]:
-        """(P,) paths of the only row that did not arrive, and are far beyond any pose."""
-        far = np.array([bool(is_far(t, squares)) for t in self.ends.t[0]])
-        return far & (self.ends.ends[0] != FINITE)
+        paths = np.stack([count, start.count - count - away, away, 0 * away], axis=1)
+        complete = np.full(clean.sum(), ModesStatus.COMPLETE)
+        return Answer(sets[clean], complete, paths[clean], row, poses, np.ones(len(row), np.int32))
 
 
-def _solve(work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> NDArray[np.int64]:
-    """Track a chunk; returns the rows that were not clean."""
-    tracked = _track(work, rows, work.start, SHARE)
-    tracked.record(outcome, rows)
-    return rows[~tracked.clean]
+def refine_real_ends(
+    problem: Problem, start: StartSystem, share: float, *, careful: bool
+) -> RealEnds:
+    """Track all solutions to each set of readings, and refine the real ones among their ends.
+
+    Args:
+        share: of the radius of convergence that a step takes.
+        careful: steps are short, so that a path that ends far away was meant to.
+    """
+    base = problem.base.astype(complex) if start.base_moves else None
+    ends = track_paths(start.poses, start.at, problem.squares.astype(complex), base, share)
+    shape = ends.how.shape
+    poses, kind = np.zeros((*shape, 7)), np.zeros(shape, np.uint8)
+    shared = np.zeros(len(problem.squares), np.bool_)
+    refine_ends(
+        problem.moving, problem.base, problem.squares, ends.pose, ends.how,
+        poses, kind, shared, np.zeros(SCRATCH),
+    )  # fmt: skip
+    # starts so far away that their paths lead to no pose
+    lost = (np.abs(start.poses[:, :3]).max(axis=1, initial=0.0) > DISTANT) & (not start.base_moves)
+    if careful:
+        lost = lost | ((kind == BEYOND) & (ends.how == STUCK))
+    away = (kind >= OPEN) & lost
+    clean = ~shared & np.all((kind < DOUBTFUL) | away, axis=1)
+    return RealEnds(start, ends, poses, kind, away, clean)
 
 
-def _solve_again(work: _Work, row: int, outcome: _Outcome) -> None:
-    """Shorter steps, then another start; what is still not clean is singular."""
+def track_again(platform: Platform, problem: Problem, k: int) -> Answer:
+    """The answer for set k from shorter steps and other starts; else it is singular."""
+    one = problem[np.array([k])]
     tries = []
     for share, number in AGAIN:
-        tracked = _track(work, np.array([row]), start_of(work.platform, number), share)
-        if tracked.clean[0]:
-            tracked.record(outcome, np.array([row]))
-            return
-        tries.append(tracked)
+        ends = refine_real_ends(one, start_system(platform, number), share, careful=True)
+        if ends.clean[0]:
+            return ends.regular(np.array([k]))
+        tries.append(ends)
     # a solution far beyond any pose is believed to be lost if every route loses one there
-    squares = work.normalised(np.array([row]))[1][0]
-    gone = [one.beyond(squares) for one in tries]
-    if all(
-        np.all(far | (one.ends.ends[0] == FINITE)) for far, one in zip(gone, tries, strict=True)
-    ):
-        for far, one in zip(gone, tries, strict=True):
-            one.away[0] = far
-    best = max(tries, key=lambda one: np.sum(one.ends.ends == FINITE))
-    _record_singular(work, row, outcome, best)
+    if not any(np.any(ends.kind == OPEN) for ends in tries):
+        tries = [replace(ends, away=ends.kind == BEYOND) for ends in tries]
+    return resolve_singular(one, max(tries, key=lambda ends: np.sum(ends.kind < OPEN)), k)
 
 
-def _record_singular(work: _Work, row: int, outcome: _Outcome, tracked: _Tracked) -> None:
-    """Regular poses, and those that the paths which came together were heading for."""
-    start, ends = tracked.start, tracked.ends
-    e, t, kind, far = tracked.e[0], tracked.t[0], tracked.kind[0], tracked.away[0]
-    base, squares = work.normalised(np.array([row]))
-    how, real = ends.ends[0], kind == REAL
-    open_ends = ~far & ((how != FINITE) | (kind == DOUBTFUL))
-    problem = Problem(start.frames.moving, base[0], squares[0], TOLERANCE)
-    lost = int(np.sum((how == LOST) & ~far))
-    stopped = ends.e[0][open_ends], ends.t[0][open_ends]
-    e, t, paths = gather(problem, (e[real], t[real]), stopped)
-    if start.paired:
-        mirrored = start.frames.reflect(e, t)  # a flat pose is its own mirror image
-        both = np.concatenate([e, mirrored[0]]), np.concatenate([t, mirrored[1]])
-        e, t, paths = merge(*both, np.concatenate([paths, paths]))
-    found = classify(problem, e, t, paths)
-    e, t, multiple = found.e, found.t, found.paths
-    jumped = len(distinct(ends.e[0], ends.t[0], SAME)) < len(how)
-    away = int(np.sum(far)) * (2 if start.paired else 1)
-    doubtful = found.unresolved + lost + jumped > 0
-    regular, meet = int(np.sum(multiple == 1)), int(multiple[multiple > 1].sum())
-    outcome.add(np.full(len(e), row), e, t, multiple)
-    outcome.paths[row] = regular, max(0, start.count - regular - meet - away), away, meet
-    if found.curve:
-        outcome.status[row] = ModesStatus.SELF_MOTION
-    elif doubtful:
-        outcome.status[row] = ModesStatus.INCOMPLETE
-    elif meet:
-        outcome.status[row] = ModesStatus.SINGULAR
+def resolve_singular(problem: Problem, found: RealEnds, k: int) -> Answer:
+    """The answer for set k, some of whose paths came together or did not arrive.
+
+    Args:
+        problem: of this set alone.
+        found: the ends of its paths.
+    """
+    start, legs = found.start, Legs.of(problem, 0)
+    ends, how, kind, away = found.ends.pose[0], found.ends.how[0], found.kind[0], found.away[0]
+    near = poses_near(legs, ends[(kind >= DOUBTFUL) & ~away])
+    poses = np.concatenate([found.poses[0][kind == REAL], near])
+    poses, counts = merge(poses, np.ones(len(poses), np.int32))
+    if start.paired:  # a flat pose is its own mirror image
+        poses, counts = merge(with_mirror_images(start, poses), np.concatenate([counts, counts]))
+    met = classify(legs, poses, counts)
+    regular = int(np.sum(met.multiplicity == 1))
+    multiple = int(met.multiplicity[met.multiplicity > 1].sum())
+    gone = int(np.sum(away)) * (2 if start.paired else 1)
+    if met.curve:
+        status = ModesStatus.SELF_MOTION
+    elif met.unresolved or np.any((how == LOST) & ~away) or len(distinct(ends, SAME)) < len(ends):
+        status = ModesStatus.INCOMPLETE
     else:
-        outcome.status[row] = ModesStatus.COMPLETE
+        status = ModesStatus.SINGULAR if multiple else ModesStatus.COMPLETE
+    paths = [regular, max(0, start.count - regular - multiple - gone), gone, multiple]
+    return Answer.one(k, status, paths, met.poses, met.multiplicity)
 
 
-def _curves(platform: Platform, work: _Work, rows: NDArray[np.int64], outcome: _Outcome) -> None:
-    """Samples of a curve of poses for each row of an architecturally singular machine."""
-    frames = work.start.frames
-    home = frames.normal(platform.home)
-    for row in rows:
-        base, squares = work.normalised(np.array([row]))
-        problem = Problem(frames.moving, base[0], squares[0], TOLERANCE)
-        e, t = curve_of_poses(problem, home, SEED)
-        outcome.add(np.full(len(e), row), e, t, np.zeros(len(e), np.int32))
-        outcome.status[row] = ModesStatus.ALWAYS_SINGULAR
+def sample_curve(problem: Problem, k: int, home: Array) -> Answer:
+    """The answer for set k of an architecturally singular machine: samples of a curve of poses."""
+    poses = curve_of_poses(Legs.of(problem, k), home, SEED)
+    none = np.zeros(len(poses), np.int32)
+    return Answer.one(k, ModesStatus.ALWAYS_SINGULAR, [0, 0, 0, 0], poses, none)
 
 
-def _assemble(
-    platform: Platform, legs: Array, start: Start, outcome: _Outcome, source: TableInfo | None
-) -> AssemblyModes:
-    """Poses in the platform's coordinates, certified, nearest to home first in each row."""
-    row, e, t, multiple = (np.concatenate(parts) for parts in zip(*outcome.blocks, strict=True))
-    pose = start.frames.pose(e, t)
-    shift, turn = pose.distance(platform.home)
-    order = np.lexsort((shift / platform.size + turn, row))
-    row, pose, multiple = row[order], pose[order], multiple[order]
-    rows = legs.reshape(-1, 6)
-    proof = certify(platform, rows[row], pose)
-    _settle_doubts(outcome, row, multiple, proof.certified, start.count)
-    return AssemblyModes(
-        platform=platform, legs=legs, pose=pose, row=row, multiplicity=multiple,
-        certificate=proof, status=outcome.status.reshape(legs.shape[:-1]),
-        paths=outcome.paths.reshape(*legs.shape[:-1], 4), solutions=start.count,
-        table=source,
-    )  # fmt: skip
+def with_mirror_images(start: StartSystem, poses: Array) -> Array:
+    """Poses (M, 7) of a planar machine, then the mirror image of each."""
+    return np.concatenate([poses, start.frames.reflect(poses)])
 
 
-def _settle_doubts(
-    outcome: _Outcome,
-    row: NDArray[np.int64],
-    multiple: NDArray[np.int32],
-    certified: NDArray[np.bool_],
-    solutions: int,
-) -> None:
-    """Poses that looked multiple but are proven to be alone are regular after all."""
-    for k in np.flatnonzero(outcome.status == ModesStatus.SINGULAR):
+def settle_doubts(
+    found: Answer, order: NDArray[np.int64], certified: NDArray[np.bool_], solutions: int
+) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]]:
+    """Status, counts of paths and multiplicities, given which poses are proven to be alone.
+
+    A pose that looked multiple but is alone is regular after all.
+
+    Args:
+        order: the order in which poses were certified.
+        solutions: complex solutions of the machine.
+    """
+    status, paths = found.status, found.paths
+    row, multiplicity = found.row[order], found.multiplicity[order]
+    for k in np.flatnonzero(status == ModesStatus.SINGULAR):
         mine = row == k
-        multiple[mine & certified] = 1
-        regular, meet = np.sum(multiple[mine] == 1), np.sum(multiple[mine & (multiple > 1)])
-        away = outcome.paths[k, 2]
-        outcome.paths[k] = regular, solutions - regular - away - meet, away, meet
+        multiplicity[mine & certified] = 1
+        regular, multiple = np.sum(multiplicity[mine] == 1), multiplicity[mine & (multiplicity > 1)]
+        gone, meet = paths[k, 2], np.sum(multiple)
+        paths[k] = regular, solutions - regular - gone - meet, gone, meet
         if not meet:
-            outcome.status[k] = ModesStatus.COMPLETE
+            status[k] = ModesStatus.COMPLETE
+    return status, paths, multiplicity

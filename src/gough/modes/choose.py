@@ -1,7 +1,8 @@
-"""Which mode is mine: filters that a real machine's pose passes, and a ranking."""
+"""The mode a machine is in: filters that its pose must pass, and a ranking."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,13 +24,13 @@ BRANCH_SLACK = 1e-6  # [rad] readings of a pose that agree with the given ones
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The modes of readings, seen through filters.
+    """Assembly modes filtered and ranked.
 
     Attributes:
-        passes: for each filter that applied, which of the M poses pass it.
+        passes: for each filter that applied, the poses (M,) that pass it.
         rank: (M,) 0 for the best pose of its set of readings, then 1, 2, ...: poses that pass
-            more filters first, then those nearer to the pose that was asked for, or home.
-        count: () or (N,) how many poses of each set pass every filter.
+            more filters first, then those nearer to `near`, or to home.
+        count: (...) how many poses of each set pass every filter.
     """
 
     passes: dict[str, NDArray[np.bool_]]
@@ -44,7 +45,7 @@ class Choice:
 
     @property
     def ambiguous(self) -> NDArray[np.bool_]:
-        """() or (N,) more than one pose passes every filter, so readings alone cannot decide."""
+        """(...) more than one pose passes every filter, so readings alone cannot decide."""
         return self.count > 1
 
     @property
@@ -64,7 +65,7 @@ def choose_mode(
     hint_error: float = 0.0,
     max_swing: float = np.inf,
 ) -> Choice:
-    """Filter and rank assembly modes by what a machine can do and what sensors say.
+    """Filter and rank assembly modes by what a machine can do and what sensors measure.
 
     Always applied: "side" (the platform joints' centre lies on home's side of the base plate;
     mirror images do not), "sign" (the sign of det J is home's, so no singularity had to be
@@ -72,20 +73,32 @@ def choose_mode(
     (the motors reach the pose on their own branch at these angles).
 
     Args:
-        near: the last known pose, batch () or (N,): "near" passes poses within max_shift
-            [platform unit] and max_turn [rad] of it, and the ranking goes by distance to it.
-        up: (3,) or (N, 3), the vertical of the base as an inclinometer on the platform sees it,
-            in platform coordinates: "up" passes poses for which R times it is within
+        near: the last known pose, () or one for each set of readings (...): "near" passes poses
+            within max_shift [platform unit] and max_turn [rad] of it, and the ranking goes by
+            distance to it.
+        up: (3,) or (..., 3), the vertical of the base as an inclinometer on the platform measures
+            it, in platform coordinates: "up" passes poses for which R times it is within
             hint_error of the base's z axis.
-        orientation: (4,) or (N, 4) quaternion wxyz of an IMU: "orientation" passes poses that
-            are turned by at most hint_error from it.
-        hint_error: [rad], of `up` and `orientation`.
-        max_swing: [rad]: "swing" passes poses whose struts are turned by at most that from
+        orientation: (4,) or (..., 4) quaternion wxyz of an IMU: "orientation" passes poses that
+            are rotated by at most hint_error from it.
+        hint_error: largest error of `up` and `orientation` [rad].
+        max_swing: "swing" passes poses whose struts are rotated by at most this [rad] from
             their direction at home, at base and at platform joints.
+
+    Raises:
+        GoughError: a hint without its error, or hints that are neither one nor one for each set.
+
+    Example:
+        >>> import gough
+        >>> platform = gough.Platform.load("reference")
+        >>> modes = gough.assembly_modes(platform, platform.home_legs)
+        >>> choice = gough.choose_mode(modes)
+        >>> choice.count, modes.pose[choice.best].position[0].round(6)
+        (array(1), array([  0.,   0., 600.]))
     """
     if (up is not None or orientation is not None) and not hint_error > 0:
         raise GoughError("hint_error: expected the sensor's error in rad, above 0, beside a hint")
-    platform, pose, row = modes.platform, modes.pose, modes.row
+    platform, pose = modes.platform, modes.pose
     passes = {"side": same_side(platform, pose), "sign": modes.sign > 0}
     if platform.stroke is not None:
         passes["stroke"] = in_stroke(platform, modes.readings)
@@ -95,34 +108,34 @@ def choose_mode(
         passes["branch"] = _on_branch(platform, pose, modes.readings)
     if max_swing < np.inf:
         passes["swing"] = swing(platform, pose) <= max_swing
-    target = platform.home if near is None else near
-    shift, turn = pose.distance(_per_row(target, row))
+    target = platform.home if near is None else _for_poses("near", near, modes)
+    translation, rotation = pose.distance(target)
     if near is not None:
-        passes["near"] = (shift <= max_shift) & (turn <= max_turn)
+        passes["near"] = (translation <= max_shift) & (rotation <= max_turn)
     if up is not None:
-        vertical = as_batch("up", up, (3,))
+        vertical = _per_pose("up", as_batch("up", up, (3,)), modes)
         vertical = vertical / np.linalg.norm(vertical, axis=-1, keepdims=True)
-        vertical = vertical[row] if vertical.ndim > 1 else vertical
         x, y, z = (pose.rotation @ vertical[..., None])[..., 0].T
         passes["up"] = np.arctan2(np.hypot(x, y), z) <= hint_error
     if orientation is not None:
         hint = Pose(np.zeros(3), as_batch("orientation", orientation, (4,)))
-        passes["orientation"] = pose.distance(_per_row(hint, row))[1] <= hint_error
-    return _ranked(modes, passes, shift / platform.size + turn)
+        hint = _for_poses("orientation", hint, modes)
+        passes["orientation"] = pose.distance(hint)[1] <= hint_error
+    return _ranked(modes, passes, translation / platform.size + rotation)
 
 
 def ambiguous(platform: Platform, legs: ArrayLike, **filters: Any) -> NDArray[np.bool_]:
-    """Whether more than one pose with these readings passes every filter of `choose_mode`.
+    """True (...) where more than one pose passes every filter of `choose_mode`.
 
     Args:
-        legs: (6,) or (N, 6).
+        legs: readings (..., 6).
         filters: as for `choose_mode`.
     """
     return choose_mode(assembly_modes(platform, legs), **filters).ambiguous
 
 
 def same_side(platform: Platform, pose: Pose) -> NDArray[np.bool_]:
-    """Whether the platform joints' centre is on home's side of the base joints' plane."""
+    """True where the platform joints' centre is on home's side of the base joints' plane."""
     centre = platform.base.mean(axis=0)
     normal = np.linalg.svd(platform.base - centre)[2][2]
     height = (joint_positions(platform, pose).mean(axis=-2) - centre) @ normal
@@ -133,7 +146,7 @@ def same_side(platform: Platform, pose: Pose) -> NDArray[np.bool_]:
 def swing(platform: Platform, pose: Pose) -> Array:
     """Largest angle of a strut from its direction at home, in base or platform axes, (M,) [rad].
 
-    What limits the ball or universal joints at both ends.
+    Ball and universal joints at both ends limit it.
     """
     base = platform.base
     if platform.rotary is not None:
@@ -152,14 +165,29 @@ def _angle(a: Array, b: Array) -> Array:
 
 
 def _on_branch(platform: Platform, pose: Pose, readings: Array) -> NDArray[np.bool_]:
-    """Whether the motors' own branch of the inverse kinematics gives the readings back."""
+    """True where the motors' own branch of the inverse kinematics gives the readings back."""
     gap = platform.gain * (leg_lengths(platform, pose) - readings)
     wrapped = np.abs(np.arctan2(np.sin(gap), np.cos(gap)))
     return np.all(wrapped < BRANCH_SLACK, axis=-1)
 
 
-def _per_row(pose: Pose, row: NDArray[np.int64]) -> Pose:
-    return pose[row] if pose.batch else pose
+def _per_pose(name: str, values: Array, modes: AssemblyModes) -> Array:
+    """A hint (k,) or (..., k) repeated for each of the M poses, (M, k)."""
+    size = values.shape[-1:]
+    try:
+        values = np.broadcast_to(values, (*modes.legs.shape[:-1], *size))
+    except ValueError:
+        raise GoughError(
+            f"{name}: expected one, or one for each set of readings {modes.legs.shape[:-1]}; "
+            f"found {values.shape[:-1]}"
+        ) from None
+    return values.reshape(-1, *size)[modes.row]
+
+
+def _for_poses(name: str, pose: Pose, modes: AssemblyModes) -> Pose:
+    """A pose, or one for each set of readings, repeated for each of the M poses."""
+    parts = (_per_pose(name, part, modes) for part in (pose.position, pose.wxyz))
+    return Pose.trusted(*parts)
 
 
 def _ranked(modes: AssemblyModes, passes: dict, distance: Array) -> Choice:
@@ -169,6 +197,6 @@ def _ranked(modes: AssemblyModes, passes: dict, distance: Array) -> Choice:
     rank = np.empty(len(row), dtype=np.int64)
     first = np.searchsorted(row, row)  # rows are in order
     rank[order] = np.arange(len(row)) - first[order]
-    sets = modes.legs.shape[:-1]
-    count = np.bincount(row[failed == 0], minlength=int(np.prod(sets))).reshape(sets)
+    batch = modes.legs.shape[:-1]
+    count = np.bincount(row[failed == 0], minlength=math.prod(batch)).reshape(batch)
     return Choice(passes, rank, count)

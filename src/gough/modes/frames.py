@@ -1,13 +1,16 @@
-"""One scale and one pair of frames for all hexapods: what the tracker calculates in.
+"""Normalised leg equations: one scale and one pair of frames for all hexapods, and complex poses.
 
 Lengths are divided by the root mean square distance of the joints from their centres, base
-and platform joints are counted from those centres, and both frames are turned by fixed
+and platform joints are counted from those centres, and both frames are rotated by fixed
 rotations in no special position, so that the symmetric poses of symmetric machines meet no
 zero pivots. With joint = R (p - c) + c + t for pivot c, the pose (t, R) becomes
 
     R' = U R V^T,      t' = U (R (m - c) + c + t - o) / scale
 
 where m and o are the centres of platform and base joints.
+
+A normalised pose is seven numbers, position t and quaternion e, real or complex. Dots are without
+conjugation: R(e) = Q(e) / (e.e) has R R^T = 1, and R is real where e is, up to a factor.
 """
 
 from __future__ import annotations
@@ -18,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough import quaternion
-from gough.checks import Array
-from gough.modes.study import product
+from gough.checks import LARGEST, Array
+from gough.kernel.paths import Complex
 from gough.platform import Platform
 from gough.pose import Pose
 
@@ -27,13 +30,12 @@ from gough.pose import Pose
 _U = np.array([0.52, 0.37, -0.61, 0.47])
 _V = np.array([-0.41, 0.66, 0.35, 0.52])
 _U, _V = _U / np.linalg.norm(_U), _V / np.linalg.norm(_V)
-_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 FLAT = 1e-12  # joints within this share of their spread from a plane lie in it
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """The change from a platform's coordinates to the tracker's and back.
+    """Change from the coordinates of a platform to normalised ones and back.
 
     Attributes:
         scale: one normalised unit of length [platform unit].
@@ -53,17 +55,18 @@ class Frames:
 
     @classmethod
     def of(cls, platform: Platform) -> Frames:
+        """Frames of a platform, from the joints alone."""
         base, moving = platform.base, platform.moving
         base_centre, moving_centre = base.mean(axis=0), moving.mean(axis=0)
         offsets = np.vstack([base - base_centre, moving - moving_centre])
         scale = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
-        planes = [_normal(joints) for joints in (base, moving)]
+        n, m = _normal(base), _normal(moving)
         mirror = None
-        if platform.rotary is None and planes[0] is not None and planes[1] is not None:
-            turned = quaternion.to_matrix(_U) @ planes[0], quaternion.to_matrix(_V) @ planes[1]
-            mirror = np.append(0.0, turned[0]), np.append(0.0, turned[1])
-        turned_moving = (moving - moving_centre) @ quaternion.to_matrix(_V).T / scale
-        return cls(scale, base_centre, moving_centre, platform.pivot_point, turned_moving, mirror)
+        if platform.rotary is None and n is not None and m is not None:
+            n, m = quaternion.to_matrix(_U) @ n, quaternion.to_matrix(_V) @ m
+            mirror = np.append(0.0, n), np.append(0.0, m)
+        rotated = (moving - moving_centre) @ quaternion.to_matrix(_V).T / scale
+        return cls(scale, base_centre, moving_centre, platform.pivot_point, rotated, mirror)
 
     def base(self, base: Array) -> Array:
         """Normalised base joints (..., 6, 3)."""
@@ -73,31 +76,108 @@ class Frames:
         """Normalised squared lengths (..., 6)."""
         return (lengths / self.scale) ** 2
 
-    def pose(self, e: Array, t: Array) -> Pose:
-        """The platform's poses of normalised real ones (..., 4), (..., 3)."""
-        wxyz = product(product(_U * _CONJUGATE, e), _V)
+    def denormalise(self, poses: Array) -> Pose:
+        """The platform's poses that normalised real ones (..., 7) stand for."""
+        t, e = poses[..., :3], poses[..., 3:]
+        wxyz = quaternion.product(quaternion.product(quaternion.conjugate(_U), e), _V)
         wxyz = wxyz / np.linalg.norm(wxyz, axis=-1, keepdims=True)
         arm = quaternion.to_matrix(wxyz) @ (self.moving_centre - self.pivot)
         there = self.scale * t @ quaternion.to_matrix(_U) + self.base_centre
         return Pose(there - arm - self.pivot, np.where(wxyz[..., :1] < 0, -wxyz, wxyz))
 
-    def normal(self, pose: Pose) -> tuple[Array, Array]:
-        """Normalised quaternions (..., 4) and positions (..., 3) of the platform's poses."""
-        e = product(product(np.broadcast_to(_U, pose.wxyz.shape), pose.wxyz), _V * _CONJUGATE)
+    def normalise(self, pose: Pose) -> Array:
+        """Normalised poses (..., 7) of the platform's."""
+        e = quaternion.product(quaternion.product(_U, pose.wxyz), quaternion.conjugate(_V))
         arm = pose.rotation @ (self.moving_centre - self.pivot)
         there = pose.position + self.pivot + arm - self.base_centre
-        return e, there @ quaternion.to_matrix(_U).T / self.scale
+        return np.concatenate([there @ quaternion.to_matrix(_U).T / self.scale, e], axis=-1)
 
-    def reflect(self, e: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
-        """The mirror images of normalised poses of a planar platform."""
+    def reflect(self, poses: NDArray) -> NDArray:
+        """Mirror images of normalised poses (..., 7), real or complex, of a planar platform."""
         assert self.mirror is not None
         n, m = self.mirror
-        shape = e.shape
-        flipped = product(product(np.broadcast_to(n, shape), e), np.broadcast_to(m, shape))
-        return flipped, t - 2 * (t @ n[1:])[..., None] * n[1:]
+        t, e = poses[..., :3], poses[..., 3:]
+        flipped = quaternion.product(quaternion.product(n, e), m)
+        return np.concatenate([t - 2 * (t @ n[1:])[..., None] * n[1:], flipped], axis=-1)
 
 
 def _normal(joints: Array) -> Array | None:
     """Unit normal of the plane that holds all joints (6, 3), or None."""
     _, spread, axes = np.linalg.svd(joints - joints.mean(axis=0))
     return axes[2] if spread[2] <= FLAT * spread[0] else None
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Normalised leg equations of N sets of readings of one machine.
+
+    Attributes:
+        moving: (6, 3) platform joints.
+        base: (N, 6, 3) lower ends of the struts, or (1, 6, 3) if the same for all sets.
+        squares: (N, 6) squared strut lengths.
+    """
+
+    moving: Array
+    base: Array
+    squares: Array
+
+    @classmethod
+    def of(cls, frames: Frames, base: Array, lengths: Array) -> Problem:
+        """Equations of struts, (N, 6, 3) or (1, 6, 3) and (N, 6) [platform unit].
+
+        Squares of lengths that are not above 0 are NaN.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.where(lengths > 0, frames.squares(lengths), np.nan)
+        return cls(frames.moving, frames.base(base), squares)
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(N,) sets whose lengths are numbers above 0 that can be calculated with."""
+        return np.all((self.squares > 0) & (self.squares < LARGEST), axis=1)
+
+    def __getitem__(self, sets: NDArray[np.int64]) -> Problem:
+        base = self.base if len(self.base) == 1 else self.base[sets]
+        return Problem(self.moving, np.ascontiguousarray(base), self.squares[sets])
+
+
+# ---- complex poses --------------------------------------------------------------------
+
+
+def rotation(poses: NDArray) -> NDArray:
+    """Rotation matrices (..., 3, 3) of poses (..., 7) whose quaternions have any length."""
+    e = poses[..., 3:]
+    return quaternion.to_matrix(e / np.sqrt(np.sum(e * e, axis=-1, keepdims=True)))
+
+
+def inverse(poses: Complex) -> Complex:
+    """Poses (..., 7) that undo these: base and platform change roles."""
+    back = np.concatenate([poses[..., :3], quaternion.conjugate(poses[..., 3:])], axis=-1)
+    t = -np.einsum("...ij,...j->...i", rotation(back), poses[..., :3])
+    return np.concatenate([t, back[..., 3:]], axis=-1)
+
+
+def squared_lengths(poses: Complex, base: Complex, moving: Complex) -> Complex:
+    """l^2 of the six struts, (..., 6)."""
+    joints = np.einsum("...ij,kj->...ki", rotation(poses), moving) + poses[..., None, :3]
+    return np.sum((joints - base) ** 2, axis=-1)
+
+
+def distances(a: NDArray, b: NDArray) -> Array:
+    """Distances (A, B) of poses a (A, 7) and b (B, 7): largest difference in R and t.
+
+    Relative to the size of a's numbers where those are above 1.
+    """
+    ka, kb = (np.concatenate([rotation(p).reshape(len(p), 9), p[:, :3]], axis=1) for p in (a, b))
+    scale = np.maximum(1.0, np.abs(ka).max(axis=1, initial=0.0))[:, None]
+    return np.abs(ka[:, None] - kb[None]).max(axis=2, initial=0.0) / scale
+
+
+def distinct(poses: NDArray, apart: float) -> NDArray[np.int64]:
+    """Indices of poses of which no earlier kept one is within `apart`."""
+    gaps = distances(poses, poses)
+    kept: list[int] = []
+    for i in range(len(poses)):
+        if not any(gaps[i, k] < apart for k in kept):
+            kept.append(i)
+    return np.array(kept, dtype=np.int64)

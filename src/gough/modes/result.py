@@ -1,11 +1,12 @@
-"""What is known about the assembly modes of leg readings."""
+"""The result of `assembly_modes`: poses, certificates and counts, also as a table."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from gough.certificate import Certificate
 from gough.checks import Array
 from gough.columns import RADIUS, RESIDUAL, STATUS, Angles
-from gough.kinematics import assembly_sign, equivalent_struts, joint_positions, singularity_distance
+from gough.kinematics import assembly_sign, joint_positions, singularity_distance
 from gough.platform import Platform
 from gough.pose import Pose, pose_cells, pose_table
 from gough.status import ModesStatus
@@ -26,25 +27,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class AssemblyModes:
-    """Every real pose of one set of readings, or of N sets.
+    """Every real pose of one set of readings, or of a batch (...) of sets.
 
-    For N sets, poses of all sets follow one another, and `row` says whose each is;
-    `modes[i]` is the answer for set i, and iterating goes through the sets. Within a set the
-    pose nearest to home comes first.
+    The M poses of all sets follow one another, set after set, the pose nearest to home first in
+    each; `row` names the set of each pose, counted through all batch axes. `modes[i]` are the
+    poses of one set or of a smaller batch, and iterating goes along the first batch axis.
 
     Attributes:
-        platform: whose modes these are.
-        legs: (6,) or (N, 6), the readings.
+        platform: the machine.
+        legs: (..., 6) the readings.
         pose: batch (M,).
-        row: (M,) set of readings that a pose belongs to; 0 for a single set.
+        row: (M,) the set of readings that a pose belongs to; 0 for a single set.
         multiplicity: (M,) 1 for a regular pose, above 1 where several solutions meet (a
             singular pose), 0 for a sample of a curve of poses.
         certificate: see `gough.certify`; batch (M,).
-        status: () or (N,) uint8, to be compared with `ModesStatus` members.
-        paths: (4,) or (N, 4): how many of the complex solutions are real, are complex, went
-            to infinity, met in singular ones.
+        status: (...) uint8, to be compared with `ModesStatus` members.
+        paths: (..., 4): how many of the complex solutions are real, are complex, went to
+            infinity, met in multiple ones.
         solutions: complex solutions that this machine has for general readings.
+        struts: lower ends (N, 6, 3), or (1, 6, 3) if they never move, and lengths (N, 6) of the
+            struts that the N sets of readings stand for [platform unit].
         table: library and row labels of the table of readings, if they came in one.
+
+    Example:
+        >>> import gough
+        >>> platform = gough.Platform.load("reference")
+        >>> modes = gough.assembly_modes(platform, [platform.home_legs, platform.home_legs + 1])
+        >>> modes.counts, modes[0].complete
+        (array([16, 16]), True)
     """
 
     platform: Platform
@@ -56,12 +66,13 @@ class AssemblyModes:
     status: NDArray[np.uint8]
     paths: NDArray[np.int32]
     solutions: int
+    struts: tuple[Array, Array]
     table: TableInfo | None = None
 
     @cached_property
     def residual(self) -> Array:
-        """(M,) largest difference between a strut's length and the one asked for [unit]."""
-        base, lengths = equivalent_struts(self.platform, self.readings)
+        """(M,) largest difference between a strut's length and its reading's [platform unit]."""
+        base, lengths = struts_of_sets(self.struts, self.row)
         struts = joint_positions(self.platform, self.pose) - base
         return np.abs(np.linalg.norm(struts, axis=-1) - lengths).max(axis=-1, initial=0.0)
 
@@ -87,31 +98,35 @@ class AssemblyModes:
 
     @property
     def complete(self) -> NDArray[np.bool_]:
-        """() or (N,) no pose is missing."""
+        """(...) no pose is missing."""
         return np.isin(self.status, (ModesStatus.COMPLETE, ModesStatus.SINGULAR))
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
-        """() or (N,) how many poses there are."""
-        sets = int(np.prod(self.legs.shape[:-1]))
-        return np.bincount(self.row, minlength=sets).reshape(self.legs.shape[:-1])
+        """(...) how many poses there are."""
+        batch = self.legs.shape[:-1]
+        return np.bincount(self.row, minlength=math.prod(batch)).reshape(batch)
 
     def __len__(self) -> int:
-        """Number of sets of readings of a batch, or of poses of a single set."""
+        """Length of a batch's first axis, or number of poses of a single set."""
         return len(self.legs) if self.legs.ndim > 1 else len(self.row)
 
-    def __getitem__(self, index: int) -> AssemblyModes:
-        if self.legs.ndim == 1:
+    def __getitem__(self, index: Any) -> AssemblyModes:
+        batch = self.legs.shape[:-1]
+        if not batch:
             raise IndexError("these are the modes of one set of readings; use .pose[index]")
-        index = range(len(self.legs))[index]
-        mine = self.row == index
-        proof = self.certificate
+        sets = np.arange(math.prod(batch)).reshape(batch)[index]
+        flat, count = np.ravel(sets), np.ravel(self.counts[index])
+        row = np.repeat(np.arange(len(flat)), count)
+        # poses of a set follow one another: its first, and how far behind it each is
+        behind = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        mine = np.repeat(np.searchsorted(self.row, flat), count) + behind
         return replace(
-            self, legs=self.legs[index], pose=self.pose[mine], row=np.zeros(mine.sum(), int),
-            multiplicity=self.multiplicity[mine], status=self.status[index],
-            certificate=proof[mine],
-            paths=self.paths[index],
-            table=self.table and self.table.at(np.full(mine.sum(), index)),
+            self, legs=self.legs[index], pose=self.pose[mine], row=row,
+            multiplicity=self.multiplicity[mine], certificate=self.certificate[mine],
+            status=self.status[index], paths=self.paths[index],
+            struts=struts_of_sets(self.struts, flat),
+            table=self.table and self.table.at(flat[row]),
         )  # fmt: skip
 
     def __iter__(self) -> Iterator[AssemblyModes]:
@@ -120,9 +135,9 @@ class AssemblyModes:
     def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
         """A table with a row for each of the M poses, set after set, nearest to home first.
 
-        row (the set of readings, from 0), x, y, z [platform unit], qw, qx, qy, qz, status (a
-        word), residual [platform unit], multiplicity, certified, radius, error [platform unit],
-        sigma_min (see `singularity_distance`), sign.
+        row (the set of readings, from 0, counted through all batch axes), x, y, z [platform
+        unit], qw, qx, qy, qz, status (a word), residual [platform unit], multiplicity,
+        certified, radius, error [platform unit], sigma_min (see `singularity_distance`), sign.
 
         Args:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
@@ -143,15 +158,16 @@ class AssemblyModes:
         if self.legs.ndim == 1:
             label = ModesStatus(int(self.status)).label
             return f"AssemblyModes({len(self.row)} poses, {label})"
-        return f"AssemblyModes({len(self.row)} poses of {len(self.legs)} sets of readings)"
+        sets = math.prod(self.legs.shape[:-1])
+        return f"AssemblyModes({len(self.row)} poses of {sets} sets of readings)"
 
     def _repr_html_(self) -> str:
         def cells(i: tuple[int, ...]) -> list[str]:
             k = i[0]
             one = self.certificate[k]
             proof = number(one.radius) if one.certified else "not proven"
-            told = [number(self.residual[k], ".2g"), proof, number(self.singularity_distance[k])]
-            return [*([str(self.row[k])] if several else []), *pose_cells(self.pose[k]), *told]
+            known = [number(self.residual[k], ".2g"), proof, number(self.singularity_distance[k])]
+            return [*([str(self.row[k])] if several else []), *pose_cells(self.pose[k]), *known]
 
         several, unit = self.legs.ndim > 1, self.platform.unit
         first, *heads = pose_heads((len(self.row),), unit)
@@ -164,6 +180,12 @@ class AssemblyModes:
         ]
         title = f"{self!r} of {self.platform.name}"
         return page(title, heads, rows_of((len(self.row),), cells), notes)
+
+
+def struts_of_sets(struts: tuple[Array, Array], sets: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Lower ends and lengths of the struts of some sets, by their numbers."""
+    base, lengths = struts
+    return base if len(base) == 1 else base[sets], lengths[sets]
 
 
 def mode_columns(modes: AssemblyModes, angles: Angles | None) -> dict[str, pa.Array]:

@@ -1,7 +1,7 @@
 """Poses where the Jacobian is singular: multiple solutions, and curves of poses (self-motion).
 
-Slow and careful NumPy, used for the few readings whose paths do not all arrive apart. All in
-normalised units.
+Slow and careful, used for the few readings whose paths do not all arrive apart. Poses are seven
+numbers in normalised units, see `gough.modes.frames`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.modes.finish import legs_at, make_real, turn_and_shift
-from gough.modes.study import Complex
+from gough.kernel.ends import TOLERANCE, leg_equations, make_real, move
+from gough.kernel.paths import Complex
+from gough.modes.frames import Problem
 
 NEAR = 0.1  # imaginary part over size up to which an end might belong to a real pose
 STEPS = 80  # of Gauss and Newton; at a double solution each halves the distance
@@ -22,184 +23,175 @@ TOGETHER = 3e-6  # distance of refined poses that are one multiple solution
 CURVE_STEP = 0.02  # between the points of a curve of poses
 CURVE_POINTS = 3000  # at most
 SAMPLES = 36  # poses that stand for a curve in an answer
+TRIES = 50  # starting poses from which a pose of an architecturally singular machine is sought
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """Real poses near the ends of paths.
+class Meeting:
+    """Real poses of one set of readings, some of whose paths came together.
 
     Attributes:
-        e, t: (M, 4), (M, 3).
-        paths: (M,) how many paths ended there; 0 for samples of a curve of poses.
-        unresolved: paths that led to no pose, though they should.
+        poses: (M, 7).
+        multiplicity: (M,) number of solutions that meet there; 0 for samples of a curve of poses.
+        unresolved: number of paths that led to no pose, though they should.
         curve: a curve of poses was found.
     """
 
-    e: Array
-    t: Array
-    paths: NDArray[np.int32]
+    poses: Array
+    multiplicity: NDArray[np.int32]
     unresolved: int
     curve: bool
 
 
-def gather(
-    problem: Problem, regular: tuple[Array, Array], ends: tuple[Complex, Complex]
-) -> tuple[Array, Array, NDArray[np.int32]]:
-    """The real poses of one set of readings, some of whose paths did not arrive.
-
-    Args:
-        regular: (R, 4), (R, 3) real poses at which paths arrived.
-        ends: where the others stopped, close to a solution or to several that meet.
-
-    Returns:
-        (M, 4), (M, 3), and how many paths belong to each, (M,).
-    """
-    extra = [pose for e, t in zip(*ends, strict=True) if (pose := problem.near(e, t)) is not None]
-    e = np.concatenate([regular[0], np.array([pose[0] for pose in extra]).reshape(-1, 4)])
-    t = np.concatenate([regular[1], np.array([pose[1] for pose in extra]).reshape(-1, 3)])
-    return merge(e, t, np.ones(len(e), np.int32))
+def poses_near(legs: Legs, ends: Complex) -> Array:
+    """Real poses (M, 7) that the ends (E, 7) of paths are close to."""
+    found = [pose for end in ends if (pose := legs.near(end)) is not None]
+    return np.array(found).reshape(-1, 7)
 
 
-def classify(problem: Problem, e: Array, t: Array, paths: NDArray[np.int32]) -> Found:
-    """Tell regular poses from multiple ones and from points of a curve of poses."""
-    paths, on_curve, unresolved = paths.copy(), [], 0
-    for k in range(len(e)):
-        values, null = problem.singular_values(e[k], t[k])
+def merge(poses: Array, paths: NDArray[np.int32]) -> tuple[Array, NDArray[np.int32]]:
+    """Those of the poses (M, 7) that differ, and the sum of `paths` (M,) at each."""
+    kept: list[int] = []
+    counts: list[int] = []
+    for i, pose in enumerate(poses):
+        same = (n for n, k in enumerate(kept) if apart(pose, poses[k]) < TOGETHER)
+        n = next(same, len(kept))
+        if n == len(kept):
+            kept.append(i)
+            counts.append(0)
+        counts[n] += int(paths[i])
+    return poses[kept], np.array(counts, np.int32)
+
+
+def classify(legs: Legs, poses: Array, paths: NDArray[np.int32]) -> Meeting:
+    """Regular poses, multiple ones and a curve of poses, of poses (M, 7) at which paths ended."""
+    multiplicity, on_curve, unresolved = paths.copy(), np.zeros(len(poses), bool), 0
+    for k, pose in enumerate(poses):
+        values, null = legs.singular_values(pose)
         if values[-1] > SMALL * values[0]:
             unresolved += int(paths[k]) - 1  # a path has come to another's pose
-            paths[k] = 1
-        elif problem.moves_along(e[k], t[k], null):
-            on_curve.append(k)
+            multiplicity[k] = 1
+        elif legs.moves_along(pose, null):
+            on_curve[k] = True
         else:
-            paths[k] = max(2, paths[k])
-    if not on_curve:
-        return Found(e, t, paths, unresolved, False)
-    k = on_curve[0]
-    curve_e, curve_t = problem.curve(e[k], t[k])
-    kept = np.array([k not in on_curve for k in range(len(e))], dtype=bool)
-    zeros = np.zeros(len(curve_e), np.int32)
-    return Found(
-        np.concatenate([e[kept], curve_e]), np.concatenate([t[kept], curve_t]),
-        np.concatenate([paths[kept], zeros]), unresolved, True,
+            multiplicity[k] = max(2, paths[k])
+    if not np.any(on_curve):
+        return Meeting(poses, multiplicity, unresolved, False)
+    curve = legs.curve(poses[np.argmax(on_curve)])
+    zeros = np.zeros(len(curve), np.int32)
+    return Meeting(
+        np.concatenate([poses[~on_curve], curve]),
+        np.concatenate([multiplicity[~on_curve], zeros]), unresolved, True,
     )  # fmt: skip
 
 
-def curve_of_poses(problem: Problem, home: tuple[Array, Array], seed: int) -> tuple[Array, Array]:
-    """Samples of a curve of poses for a machine whose legs are dependent at every pose.
+def curve_of_poses(legs: Legs, home: Array, seed: int) -> Array:
+    """Samples (M, 7) of a curve of poses for a machine whose legs are dependent at every pose.
 
-    Starts at home, then at random poses; empty if no pose has the legs.
+    Starts at home (7,), then at random poses; empty if no pose has the legs.
     """
     rng = np.random.default_rng(seed)
-    for attempt in range(50):
-        e, t = home[0].copy(), home[1].copy()
+    for attempt in range(TRIES):
+        pose = home.copy()
         if attempt:
-            e, t = rng.normal(size=4), home[1] + rng.normal(size=3)
-            e /= np.linalg.norm(e)
-        if problem.settle(e, t, damped=True):
-            return problem.curve(e, t)
-    return np.zeros((0, 4)), np.zeros((0, 3))
+            pose[3:] = rng.normal(size=4)
+            pose[:3] += rng.normal(size=3)
+            pose[3:] /= np.linalg.norm(pose[3:])
+        settled = legs.settle(pose, damped=True)
+        if settled is not None:
+            return legs.curve(settled)
+    return np.zeros((0, 7))
 
 
-def merge(e: Array, t: Array, paths: NDArray[np.int32]) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Poses that are the same become one, their paths added."""
-    kept: list[int] = []
-    counts: list[int] = []
-    for i in range(len(e)):
-        for n, k in enumerate(kept):
-            if apart(e[i], t[i], e[k], t[k]) < TOGETHER:
-                counts[n] += int(paths[i])
-                break
-        else:
-            kept.append(i)
-            counts.append(int(paths[i]))
-    return e[kept], t[kept], np.array(counts, np.int32)
-
-
-def apart(e: Array, t: Array, f: Array, u: Array) -> float:
-    """Distance of two real poses: shift, or twice the sine of a quarter turn."""
-    return float(max(np.abs(t - u).max(), min(np.abs(e - f).max(), np.abs(e + f).max())))
+def apart(a: Array, b: Array) -> float:
+    """Distance of two real poses: of position, or twice the sine of a quarter of the angle."""
+    e, f = a[3:], b[3:]
+    return float(max(np.abs(a - b)[:3].max(), min(np.abs(e - f).max(), np.abs(e + f).max())))
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """Six legs to be matched: (6, 3), (6, 3), (6,), largest |l^2 - d.d| / 2 that counts as 0."""
+class Legs:
+    """Leg equations of one set of readings: joints (6, 3) and (6, 3), squared lengths (6,)."""
 
-    p: Array
+    moving: Array
     base: Array
     squares: Array
-    tolerance: float
 
-    def linear(self, e: Array, t: Array) -> tuple[Array, Array]:
-        """Jacobian (6, 6) and what is missing (6,) at a pose."""
+    @classmethod
+    def of(cls, problem: Problem, row: int) -> Legs:
+        """Those of one set of a problem."""
+        return cls(problem.moving, problem.base[row % len(problem.base)], problem.squares[row])
+
+    def linear(self, pose: Array) -> tuple[Array, Array]:
+        """Jacobian (6, 6) and what is missing in half the squared lengths (6,) at a pose."""
         a, x = np.empty((6, 6)), np.empty(6)
-        legs_at(self.p, self.base, self.squares, e, t, a, x)
+        leg_equations(self.moving, self.base, self.squares, pose, a, x)
         return a, x
 
-    def near(self, e: Complex, t: Complex) -> tuple[Array, Array] | None:
+    def near(self, end: Complex) -> Array | None:
         """The real pose that a complex end is close to, if there is one."""
-        real_e, real_t = np.empty(4), np.empty(3)
-        if not make_real(e, t, real_e, real_t) < NEAR:
+        pose = np.empty(7)
+        if not make_real(end, pose) < NEAR:
             return None
-        before = real_e.copy(), real_t.copy()
-        if not self.settle(real_e, real_t, damped=False):
-            return None
-        return (real_e, real_t) if apart(real_e, real_t, *before) < NEAR else None
+        settled = self.settle(pose, damped=False)
+        return settled if settled is not None and apart(settled, pose) < NEAR else None
 
-    def settle(self, e: Array, t: Array, damped: bool) -> bool:
-        """Gauss-Newton in place, shortest steps; True if the legs are matched."""
+    def settle(self, pose: Array, damped: bool) -> Array | None:
+        """The pose to which Gauss-Newton's shortest steps lead, if it matches the legs."""
         damping = 1.0 if damped else 0.0
-        a, x = self.linear(e, t)
+        a, x = self.linear(pose)
         for _ in range(STEPS if not damped else 3 * STEPS):
             left = np.abs(x).max()
-            if left < 0.01 * self.tolerance:
-                return True
+            if left < 0.01 * TOLERANCE:
+                return pose
             if damped:
                 step = np.linalg.solve(a.T @ a + damping * np.eye(6), a.T @ x)
             else:
                 step = np.linalg.lstsq(a, x, rcond=1e-10)[0]
-            length = np.linalg.norm(step)
-            new_e, new_t = e.copy(), t.copy()
-            turn_and_shift(new_e, new_t, step * min(1.0, 0.3 / (length + 1e-300)))
-            new_a, new_x = self.linear(new_e, new_t)
+            new = moved(pose, step * min(1.0, 0.3 / (np.linalg.norm(step) + 1e-300)))
+            new_a, new_x = self.linear(new)
             if damped and np.abs(new_x).max() > left:
                 damping = max(4 * damping, 1e-8)
                 continue
             damping *= 0.2
-            e[:], t[:], a, x = new_e, new_t, new_a, new_x
-        return bool(np.abs(x).max() <= self.tolerance)
+            pose, a, x = new, new_a, new_x
+        return pose if np.abs(x).max() <= TOLERANCE else None
 
-    def singular_values(self, e: Array, t: Array) -> tuple[Array, Array]:
+    def singular_values(self, pose: Array) -> tuple[Array, Array]:
         """Singular values of the Jacobian, and the direction of the smallest."""
-        values, directions = np.linalg.svd(self.linear(e, t)[0])[1:]
+        values, directions = np.linalg.svd(self.linear(pose)[0])[1:]
         return values, directions[-1]
 
-    def moves_along(self, e: Array, t: Array, null: Array) -> bool:
-        """Whether the platform can leave a singular pose with its legs locked.
+    def moves_along(self, pose: Array, null: Array) -> bool:
+        """True if the platform can leave a singular pose with its legs locked.
 
         A step along the null direction is corrected: at an isolated multiple solution the
         correction leads back, or no pose is found; on a curve it stays where it is.
         """
         for sign in (1.0, -1.0):
-            f, u = e.copy(), t.copy()
-            turn_and_shift(f, u, sign * CURVE_STEP * null)
-            there = f.copy(), u.copy()
-            if self.settle(f, u, damped=False) and apart(f, u, *there) < CURVE_STEP / 10:
+            there = moved(pose, sign * CURVE_STEP * null)
+            settled = self.settle(there, damped=False)
+            if settled is not None and apart(settled, there) < CURVE_STEP / 10:
                 return True
         return False
 
-    def curve(self, e: Array, t: Array) -> tuple[Array, Array]:
-        """Points of the curve of poses through one of its points, evenly chosen."""
-        points = [(e.copy(), t.copy())]
-        along = self.singular_values(e, t)[1]
+    def curve(self, pose: Array) -> Array:
+        """Points (M, 7) of the curve of poses through one of its points, evenly chosen."""
+        points = [pose]
+        along = self.singular_values(pose)[1]
         for _ in range(CURVE_POINTS):
-            f, u = points[-1][0].copy(), points[-1][1].copy()
-            turn_and_shift(f, u, CURVE_STEP * along)
-            if not self.settle(f, u, damped=False):
+            settled = self.settle(moved(points[-1], CURVE_STEP * along), damped=False)
+            if settled is None or (len(points) > 3 and apart(settled, pose) < CURVE_STEP):
                 break
-            if len(points) > 3 and apart(f, u, *points[0]) < CURVE_STEP:
-                break
-            points.append((f, u))
-            null = self.singular_values(f, u)[1]
+            points.append(settled)
+            null = self.singular_values(settled)[1]
             along = null if null @ along > 0 else -null
         chosen = np.unique(np.linspace(0, len(points) - 1, SAMPLES).round().astype(int))
-        return np.array([points[k][0] for k in chosen]), np.array([points[k][1] for k in chosen])
+        return np.array(points)[chosen]
+
+
+def moved(pose: Array, twist: Array) -> Array:
+    """The pose after a translation and a rotation vector (6,), to first order."""
+    there = pose.copy()
+    move(there, np.ascontiguousarray(twist))
+    return there

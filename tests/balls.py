@@ -1,8 +1,9 @@
-"""The certificate once more, in ball arithmetic with as many digits as wanted.
+"""The certificate once more, in ball arithmetic with as many digits as needed.
 
-Slow, for checking the fast one and for proving the stored start system: every number is a
-ball that holds the exact one (Arb, through python-flint: pip install "gough[proof]"). Poses
-may be complex; norms are Hermitian then, which changes one bound (see `_curvature`).
+Slow; it checks `gough.certificate`, whose bounds it repeats, and proves the stored start system
+(tools/start_system.py). Every number is a ball that holds the exact one (Arb, through
+python-flint). Poses may be complex; norms are Hermitian then, which changes one bound (see
+`_curvature`).
 """
 
 from __future__ import annotations
