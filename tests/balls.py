@@ -43,8 +43,8 @@ def prove(base, moving, squares, e, t, steps: int = 6) -> Proof | None:
         steps: of Newton; 0 proves the pose as it is given.
     """
     flint.ctx.prec = BITS
-    base, moving = ([[acb(complex(v)) for v in row] for row in m] for m in (base, moving))
-    squares, e, t = ([acb(complex(v)) for v in row] for row in (squares, e, t))
+    base, moving = ([numbers(row) for row in m] for m in (base, moving))
+    squares, e, t = (numbers(row) if not isinstance(row, list) else row for row in (squares, e, t))
     for _ in range(steps):
         f, a, *_ = equations(base, moving, squares, e, t)
         try:
@@ -54,6 +54,11 @@ def prove(base, moving, squares, e, t, steps: int = 6) -> Proof | None:
         e, t = _moved(moving, e, t, [x[i, 0] for i in range(6)])
         e, t = [acb(v.mid()) for v in e], [acb(v.mid()) for v in t]
     return _radii(base, moving, squares, e, t)
+
+
+def numbers(values) -> Vector:
+    """Numbers as balls that hold just them."""
+    return [acb(complex(v)) for v in values]
 
 
 def size_of(moving) -> arb:

@@ -117,10 +117,8 @@ def certify(platform: Platform, legs: ArrayLike | Table, pose: Pose) -> Certific
     position = np.broadcast_to(pose.position, (*shape, 3)).reshape(-1, 3)
     wxyz = np.broadcast_to(pose.wxyz, (*shape, 4)).reshape(-1, 4)
     found = certify_struts(platform, base, lengths, Pose.trusted(position, wxyz))
-    certified, radius, error = (
-        part.reshape(shape) for part in (found.certified, found.radius, found.error)
-    )
-    return Certificate(certified, radius, error, platform.unit)
+    radius, error = found.radius.reshape(shape), found.error.reshape(shape)
+    return Certificate(radius > 0, radius, error, platform.unit)
 
 
 def certify_struts(platform: Platform, base: Array, lengths: Array, pose: Pose) -> Certificate:
@@ -154,7 +152,7 @@ def _bounds(
     shared = np.concatenate([turn, matrix.ravel(), (moving - centre).ravel(), centre, size])
     bound_rows(
         shared, np.ascontiguousarray((base - platform.pivot_point) @ matrix.T),
-        *(np.ascontiguousarray(part) for part in (lengths, pose.position, pose.wxyz)),
-        radius, error, np.zeros(SLOTS * LANES),
+        np.ascontiguousarray(lengths), np.ascontiguousarray(pose.position),
+        np.ascontiguousarray(pose.wxyz), radius, error, np.zeros(SLOTS * LANES),
     )  # fmt: skip
     return radius, error

@@ -8,25 +8,26 @@ arithmetic repeat `product` and `to_matrix`; their tests compare them with these
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough.checks import Array
 
 SERIES_ANGLE = 0.3  # [rad] below it, series whose first dropped term is under 1e-15
 
 
-def conjugate(wxyz: Array) -> Array:
+def conjugate(wxyz: NDArray) -> NDArray:
     """Quaternions (..., 4) of the inverse rotations."""
     return wxyz * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def product(a: Array, b: Array) -> Array:
+def product(a: NDArray, b: NDArray) -> NDArray:
     """Hamilton product of quaternions (..., 4): the rotation b, then a."""
     aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
     return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
 
 
-def to_matrix(wxyz: Array) -> Array:
+def to_matrix(wxyz: NDArray) -> NDArray:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(wxyz, -1, 0)
     rows = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import balls
 import numpy as np
 import pytest
@@ -36,14 +38,15 @@ def test_bounds_hold_in_ball_arithmetic(name):
     pivot = platform.pivot_point
     exact = [[balls.acb(v) for v in row] for row in platform.moving - pivot]
     for k in range(len(pose)):
-        start = (pose.wxyz[k], pose.position[k])
+        e, t = pose.wxyz[k], pose.position[k]
         squares = [balls.acb(v) ** 2 for v in lengths[k]]
         problem = base[k] - pivot, platform.moving - pivot, squares
-        solved = balls.prove(*problem, *start)
-        given = [[balls.acb(v) for v in part] for part in start]
-        gaps = balls.relative(exact, *given, solved.e, solved.t)
+        solved, unrefined = balls.prove(*problem, e, t), balls.prove(*problem, e, t, steps=0)
+        assert solved is not None
+        assert unrefined is not None
+        gaps = balls.relative(exact, balls.numbers(e), balls.numbers(t), solved.e, solved.t)
         assert all(gap < float(proof.error[k]) for gap in gaps)
-        assert proof.radius[k] <= balls.prove(*problem, *start, steps=0).radius
+        assert proof.radius[k] <= unrefined.radius
         assert proof.radius[k] > 0.999 * solved.radius
 
 
@@ -63,8 +66,9 @@ def test_rounding_is_accounted_for_far_from_the_origin():
         solved = balls.prove(
             platform.base, platform.moving, squares, pose.wxyz[k], pose.position[k]
         )
-        given = [[balls.acb(v) for v in part] for part in (pose.wxyz[k], pose.position[k])]
-        gaps = balls.relative(exact, *given, solved.e, solved.t)
+        assert solved is not None
+        e, t = balls.numbers(pose.wxyz[k]), balls.numbers(pose.position[k])
+        gaps = balls.relative(exact, e, t, solved.e, solved.t)
         assert all(gap < float(proof.error[k]) for gap in gaps)
 
 
@@ -91,7 +95,7 @@ def contracts(platform, legs, pose, edge) -> bool:
     _, a, d, m, size = balls.equations(base, moving, squares, e, t)
     box = [arb(0, edge) for _ in range(7)]  # 2 g0, 2 c, 2 L r
     g0, c, r = box[0] / 2, [v / 2 for v in box[1:4]], [v / (2 * size) for v in box[4:]]
-    rows = [[0.0] * 7 for _ in range(7)]
+    rows: list[list] = [[0.0] * 7 for _ in range(7)]
     rows[0] = [arb(1), *r, *[v / size for v in c]]  # of 2 (g0 + r.c)
     for i in range(6):
         di, mi = [v.real for v in d[i]], [v.real for v in m[i]]
@@ -204,7 +208,8 @@ def test_radius_scales_with_the_unit(unit):
 
 def test_bounds_are_calculated_in_the_order_they_are_derived_in():
     """No flag lets the compiler reorder sums: its bounds on rounding assume the written order."""
-    assert not bounds.bound_rows.targetoptions["fastmath"]
+    rows: Any = bounds.bound_rows
+    assert not rows.targetoptions["fastmath"]
     assert set(lanes._FLAGS) == {"contract", "nsz"}
 
 

@@ -9,6 +9,7 @@ import pytest
 from modes.poses import poses_of
 
 import gough
+from gough import quaternion
 from gough.kernel import series
 from gough.kernel.ends import SCRATCH, leg_equations, refine_ends
 from gough.kernel.jit import jit
@@ -81,6 +82,9 @@ def test_traced_code_calculates_what_numpy_does(code, kind):
     assert np.allclose(found, numbers, rtol=1e-14, atol=1e-14)
 
 
+ZERO = np.zeros((), complex)
+
+
 def problem(seed, moves=True):
     """Joints, a pose, squared lengths, and rates of change of lengths and base joints."""
     rng = np.random.default_rng(seed)
@@ -89,8 +93,8 @@ def problem(seed, moves=True):
     return p, base, pose, squares, gaussian(rng, 6), gaussian(rng, 6, 3) * moves
 
 
-def slots(pose, base, squares, rate=0.0, speed=0.0, step=0.0):
-    z = [np.zeros(1, complex) for _ in range(SLOTS)]
+def slots(pose, base, squares, rate=ZERO, speed=ZERO, step=0.0):
+    z: list = [np.zeros(1, complex) for _ in range(SLOTS)]
     for slot, values in ((T, pose), (BASE, base), (L2, squares), (L2_RATE, np.full(6, rate)),
                          (BASE_RATE, np.full((6, 3), speed)), (STEP, [step])):  # fmt: skip
         for k, value in enumerate(np.ravel(values)):
@@ -161,7 +165,7 @@ def test_complex_rotations_preserve_dots():
     a, b = gaussian(np.random.default_rng(6), 2, 7)
     r = rotation(a)
     assert np.allclose(r @ r.T, np.eye(3))
-    both = np.append(np.zeros(3), gough.quaternion.product(a[3:], b[3:]))
+    both = np.append(np.zeros(3), quaternion.product(a[3:], b[3:]))
     assert np.allclose(rotation(both), r @ rotation(b))
 
 

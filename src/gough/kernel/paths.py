@@ -106,9 +106,9 @@ def track_paths(
         rates[:, :18] = (base - at.base).reshape(-1, 18)
     rates[:, 18:] = squares - at.squares
     origin = np.concatenate([at.base.ravel(), at.squares])
-    doubles = (_doubles(a) for a in (at.moving.ravel(), start, origin, rates, ends.pose))
     _track(
-        *doubles, base is not None, share, ends.how, ends.passes,
+        _doubles(at.moving.ravel()), _doubles(start), _doubles(origin), _doubles(rates),
+        _doubles(ends.pose), base is not None, share, ends.how, ends.passes,
         np.zeros(SLOTS * SLOT), np.zeros((4, LANES), np.int64),
     )  # fmt: skip
     return ends

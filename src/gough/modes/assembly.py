@@ -70,7 +70,7 @@ def assembly_modes(
     sets = np.flatnonzero(problem.valid)
     if start.singular:
         home = start.frames.normalise(platform.home)
-        answers = [sample_curve(problem, k, home) for k in sets]
+        answers = [sample_curve(problem, k, home) for k in sets.tolist()]
     else:
         answers = find_poses(platform, problem, sets, workers)
     found = Answer.join(len(lengths), answers)
@@ -111,7 +111,7 @@ class Answer:
 
     @classmethod
     def one(
-        cls, k: int, status: int, paths: list[int], poses: Array, multiplicity: Array
+        cls, k: int, status: int, paths: list[int], poses: Array, multiplicity: NDArray[np.int32]
     ) -> Answer:
         """The answer for set k."""
         row = np.full(len(poses), k)
@@ -148,7 +148,7 @@ def find_poses(
         with ThreadPoolExecutor(workers) as pool:
             done = list(pool.map(run, chunks))
     answers = [answer for answer, _ in done]
-    return answers + [track_again(platform, problem, k) for _, left in done for k in left]
+    return answers + [track_again(platform, problem, k) for _, left in done for k in left.tolist()]
 
 
 @dataclass(frozen=True, eq=False)

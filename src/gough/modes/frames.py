@@ -153,8 +153,8 @@ def rotation(poses: NDArray) -> NDArray:
 def inverse(poses: Complex) -> Complex:
     """Poses (..., 7) that undo these: base and platform change roles."""
     back = np.concatenate([poses[..., :3], quaternion.conjugate(poses[..., 3:])], axis=-1)
-    t = -np.einsum("...ij,...j->...i", rotation(back), poses[..., :3])
-    return np.concatenate([t, back[..., 3:]], axis=-1)
+    back[..., :3] = -np.einsum("...ij,...j->...i", rotation(back), poses[..., :3])
+    return back
 
 
 def squared_lengths(poses: Complex, base: Complex, moving: Complex) -> Complex:

@@ -148,7 +148,7 @@ class Legs:
                 step = np.linalg.solve(a.T @ a + damping * np.eye(6), a.T @ x)
             else:
                 step = np.linalg.lstsq(a, x, rcond=1e-10)[0]
-            new = moved(pose, step * min(1.0, 0.3 / (np.linalg.norm(step) + 1e-300)))
+            new = moved(pose, step * min(1.0, 0.3 / float(np.linalg.norm(step) + 1e-300)))
             new_a, new_x = self.linear(new)
             if damped and np.abs(new_x).max() > left:
                 damping = max(4 * damping, 1e-8)
@@ -190,7 +190,7 @@ class Legs:
         return np.array(points)[chosen]
 
 
-def moved(pose: Array, twist: Array) -> Array:
+def moved(pose: Array, twist: NDArray) -> Array:
     """The pose after a translation and a rotation vector (6,), to first order."""
     there = pose.copy()
     move(there, np.ascontiguousarray(twist))
