@@ -1,6 +1,8 @@
 """The commands dataset, train and evaluate."""
 
 import json
+import re
+import signal
 from importlib import import_module
 
 import pytest
@@ -10,6 +12,8 @@ from learn.networks import reference
 from gough import GoughError
 from gough.commands import COMMANDS
 from gough.learn.config import PRESETS, TrainConfig
+from gough.learn.run_folder import CHECKPOINT, WEIGHTS, load_tensors
+from gough.learn.train import Trainer
 
 
 def call(name: str, *arguments: str) -> int:
@@ -62,6 +66,29 @@ def test_train_own_platform_then_evaluate(tmp_path, capsys):
     assert rows[0]["newton"]["true"] == 200
     with pytest.raises(GoughError, match="holds a run already"):
         call("train", "-p", str(own), "-o", str(run))
+
+
+def test_ctrl_c_keeps_a_checkpoint_and_says_how_to_go_on(tmp_path, capsys, monkeypatch):
+    folder, learn = tmp_path / "run", Trainer.learn
+
+    def interrupted(self, progress):
+        if self.step == 2:
+            signal.raise_signal(signal.SIGINT)
+        return learn(self, progress)
+
+    handler = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(Trainer, "learn", interrupted)
+    arguments = ("-p", "reference", "-o", str(folder), "--steps", "12")
+    options = ("default", "--model.options", "width", "8", "--data.test", "50")
+    assert call("train", *arguments, *options) == 130
+    err = capsys.readouterr().err
+    assert re.search(r"stopped after 3 steps, 25 % of the run; \d:\d\d is left\.", err)
+    assert f"gough train -p reference -o {folder} --resume" in err
+    assert load_tensors(folder / CHECKPOINT)[1]["step"] == 3
+    assert signal.getsignal(signal.SIGINT) == handler
+    monkeypatch.undo()
+    assert call("train", "-p", "reference", "-o", str(folder), "--resume") == 0
+    assert load_tensors(folder / WEIGHTS)[1]["record"]["steps"] == 12
 
 
 def test_help_loads_no_torch():

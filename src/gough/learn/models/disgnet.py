@@ -14,9 +14,9 @@ the message cheap, exactly:
 
 and of the 144 pairs only the 12 that hold a leg depend on the sample: p_j and q_j are a
 constant of the batch plus one term, that of the leg at node j. The structured evaluation
-computes just these. It also shows what the network can express: p_j * q_j depends on one leg,
-so z is a sum of functions of single legs, and all that is known about how legs act together
-must be learned by the dense layers of the head.
+computes only these. Since p_j * q_j depends on one leg, z is a sum of functions of single legs, and
+the interaction of legs must be learned by the dense layers of the head. This is a property of the
+linear map W, one reading of the paper; `disgnet_nonlinear` is another.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from gough.learn.models.graph import GraphNetwork
 from gough.learn.models.layers import Dense, RadialBasis, Standardise, dense_stack
 from gough.platform import Platform
 
-BEYOND = 1.15  # how much wider than the sampled range of readings the tables are
+BEYOND = 1.15  # range of the tables, relative to the sampled range of readings
 
 
 class DisGNet(GraphNetwork):
-    """DisGNet with two evaluations of the same weights.
+    """DisGNet, linear after the 2-FWL product, with two evaluations of the same weights.
 
     Args:
         width: H.
@@ -76,7 +76,7 @@ class DisGNet(GraphNetwork):
         self.head = nn.Sequential(*(Dense(width, width) for _ in range(head)), nn.LayerNorm(width))
         self.last = nn.Linear(width, self.outputs)
         self.start_near_home(self.last)
-        with torch.no_grad():  # most of the sum is constant; see to it that the head sees the rest
+        with torch.no_grad():  # most of the sum is constant; standardise the rest for the head
             constant, single, product = self._by_leg(self.edges(torch.randn(512, 6)))
             self.readout.start(self._pool(constant, single.sum(1), product.sum(1)))
 
@@ -106,8 +106,8 @@ class DisGNet(GraphNetwork):
     def tabulated(self, x: Tensor) -> Tensor:
         """Raw numbers (N, 12) for normalised readings (N, 6), to about 1e-6, at less cost.
 
-        As z is a sum of functions of single legs, they are evaluated at a few nodes of each
-        leg's range, turned into Chebyshev series there, and these evaluated at the samples.
+        z is a sum of functions of single legs. They are evaluated at a few nodes of each leg's
+        range and converted to Chebyshev series, which are evaluated at the samples.
         """
         at_nodes, analysis = chebyshev(self.table, x)
         middle, half = self.range_middle.to(x), self.range_half.to(x)
@@ -119,7 +119,7 @@ class DisGNet(GraphNetwork):
         return self._finish(self._pool(constant, terms.flatten(1) @ series, None))
 
     def _by_leg(self, edges: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """What z is made of: a constant (H,), and for lengths (N, 6) two terms (N, 6, H)."""
+        """Parts of z: a constant (H,), and for lengths (N, 6) two terms (N, 6, H)."""
         nodes = self._nodes(torch.arange(NODES, device=edges.device))  # (12, 12, H)
         rings = self.ring_matrix.to(edges)
         fixed = self._no_leg(edges)
@@ -139,12 +139,12 @@ class DisGNet(GraphNetwork):
         return (constant + single + message) / NODES
 
     def _nodes(self, order: Tensor) -> Tensor:
-        """(12, 12, H)"""
+        """f1(emb d_u) * f2(emb d_v), (12, 12, H)."""
         e = self.embed(order)
         return self.node_first(e)[:, None] * self.node_second(e)[None]
 
     def _pair(self, there: Tensor, back: Tensor) -> Tensor:
-        """Distances (...) to features (..., H)."""
+        """Features (..., H) of distances (...), g12 and g21 multiplied."""
         return self.edge_there(self.basis(there)) * self.edge_back(self.basis(back))
 
     def _no_leg(self, like: Tensor) -> Tensor:
