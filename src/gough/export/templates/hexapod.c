@@ -260,10 +260,12 @@ static int follow(problem *w, int *steps, real *side)
         newton_step(w);
         ++*steps;
         if (n == 0) *side = w->determinant;
-        if (!(w->step > SMALL_STEP)) break;
+        if (w->step > SMALL_STEP && n < NEWTON_STEPS - 1) continue;
+        assess(w);
+        if (w->residual <= TOLERANCE) return 1;
+        if (!is_finite(w->step)) return 0;
     }
-    assess(w);
-    return w->residual <= TOLERANCE;
+    return 0;
 }
 
 /* ---- damped least squares (gough: kernel/descent.py, kernel/linear.py) --------------------- */
@@ -631,15 +633,18 @@ hexapod_status hexapod_twist(const hexapod_pose *pose, const real leg_rates[6], 
 
 /* Whether two poses are farther apart than a distance and an angle [rad]. Unit quaternions q and p
  * that turn by t from each other have |q - p|^2 = 4 sin^2(t / 4), or |q + p|^2. */
-static int far_apart(const real s0[3], const real q0[4], const real s1[3], const real q1[4],
-                     real shift, real turn)
+static int far_apart(const hexapod_pose *a, const hexapod_pose *b, real shift, real turn)
 {
     const real sine = turn < PI ? 2 * SIN(R(0.25) * turn) : 2;
     real moved = 0, minus = 0, plus = 0;
-    for (int k = 0; k < 3; k++) moved += (s1[k] - s0[k]) * (s1[k] - s0[k]);
+    for (int k = 0; k < 3; k++) {
+        const real step = a->position[k] - b->position[k];
+        moved += step * step;
+    }
     for (int k = 0; k < 4; k++) {
-        minus += (q1[k] - q0[k]) * (q1[k] - q0[k]);
-        plus += (q1[k] + q0[k]) * (q1[k] + q0[k]);
+        const real less = a->wxyz[k] - b->wxyz[k], more = a->wxyz[k] + b->wxyz[k];
+        minus += less * less;
+        plus += more * more;
     }
     return moved > shift * shift || (minus > sine * sine && plus > sine * sine);
 }
@@ -662,8 +667,7 @@ static int confirmed(hexapod_tracker *t, const problem *w)
     int agrees = 0;
     get_pose(w, &found);
     if (t->has_candidate) {
-        agrees = !far_apart(t->candidate.position, t->candidate.wxyz, found.position, found.wxyz,
-                            t->max_shift, t->max_turn);
+        agrees = !far_apart(&t->candidate, &found, t->max_shift, t->max_turn);
     }
     if (!w->inside && t->next_start < START_COUNT) { /* look for one inside from all starts first */
         if (!t->has_candidate) t->candidate = found;
@@ -682,15 +686,16 @@ static int confirmed(hexapod_tracker *t, const problem *w)
  * it ends across a singularity. Where it ends inside the workspace, `found` is set. */
 static int followed(hexapod_tracker *t, problem *w, int cycles, int *crossed, int *found)
 {
+    hexapod_pose pose;
     real side;
     set_internal(w, t->at);
     *found = follow(w, &t->info.steps, &side);
     t->info.residual = w->residual * SIZE;
     if (t->side == 0) t->side = side; /* the first reading from a given start */
     *crossed = *found && (w->determinant < 0) != (t->side < 0);
+    get_pose(w, &pose);
     if (*found && !*crossed &&
-        !far_apart(t->at, t->at + 3, w->s, w->q, t->max_shift * PER_SIZE * (real)cycles,
-                   t->max_turn * (real)cycles)) {
+        !far_apart(&t->pose, &pose, t->max_shift * (real)cycles, t->max_turn * (real)cycles)) {
         return 1;
     }
     *found = *found && w->inside;
