@@ -15,7 +15,9 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
+import cffi
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
@@ -24,14 +26,14 @@ from exported import Rows, build, drives
 from solver import processor
 
 import gough
-from gough import Platform, Status, Tracker
+from gough import Platform, Pose, Status, Tracker
 from gough.export.tables import MAX_STEPS
 
 ARM = {
     "Cortex-M7, double": ("double", "-mcpu=cortex-m7", "-mfpu=fpv5-d16"),
     "Cortex-M4, float": ("float", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"),
 }
-AGAIN = 30  # cycles within which both trackers must agree again
+GENHEX = Path("/usr/lib/linuxcnc/modules/genhexkins.so")
 
 
 def main() -> None:
@@ -142,18 +144,54 @@ def home_table(folder: Path, count: int) -> None:
     legs = gough.leg_lengths(platform, pose)
     print(f"| linuxcnc_genhex, +-100 mm, +-60 deg, {len(pose):,} poses with home's sign of det J, "
           "from home | true pose | another, called usable | another, called so | none "
-          "| steps, mean and most |")  # fmt: skip
-    print("|---|---|---|---|---|---|")
+          "| steps, mean and most | mean time |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|")
     for real, near in (("double", 1e-9), ("float", 1e-4)):
         machine = build(platform, folder / f"home_{real}", real=real)
+        begin = time.perf_counter()
         rows = machine.solve(legs, platform.home)
+        seconds = time.perf_counter() - begin
         true = rows.pose.distance(pose)[0] < near * platform.size
-        usable, failed = rows.status <= Status.NEAR_SINGULARITY, rows.status > 3
-        shares = [true, ~true & usable, ~true & ~usable & ~failed, failed]
-        cells = " | ".join(f"{np.mean(share):.3%}" for share in shares)
-        print(f"| {real} | {cells} | {rows.steps.mean():.2f}, {rows.steps.max()} |", flush=True)
+        home_row(f"exported C, {real}", true, rows.status, rows.steps, seconds)
         assert rows.steps.max() <= MAX_STEPS
+    if GENHEX.exists():
+        found, codes, seconds = genhexkins(folder, legs, platform.home)
+        true = found.distance(pose)[0] < 1e-6 * platform.size  # it stops at 1e-9 in
+        home_row("LinuxCNC's genhexkins", true, np.where(codes < 0, 5, 0), None, seconds)
+    else:
+        print("LinuxCNC (linuxcnc-uspace) is not installed: no row for genhexkins")
     print()
+
+
+def home_row(name: str, true, status, steps, seconds: float) -> None:
+    usable, failed = status <= Status.NEAR_SINGULARITY, status > Status.OUTSIDE_WORKSPACE
+    true = true & ~failed
+    shares = [true, ~true & usable, ~true & ~usable & ~failed, failed]
+    cells = " | ".join(f"{np.mean(share):.3%}" for share in shares)
+    taken = "" if steps is None else f"{steps.mean():.2f}, {steps.max()}"
+    each = seconds / len(true) * 1e6
+    print(f"| {name} | {cells} | {taken} | {each:.2f} us |", flush=True)
+
+
+def genhexkins(folder: Path, legs: np.ndarray, home: Pose) -> tuple:
+    """Poses, codes and time [s] of LinuxCNC's own module."""
+    library = folder / "genhex.so"
+    source = Path(exported.__file__).parent / "genhex.c"
+    exported.run(["gcc", "-O2", "-fPIC", "-shared", f'-DMODULE="{GENHEX}"', source, "-o", library])
+    ffi = cffi.FFI()
+    ffi.cdef("int genhex_load(void); void genhex_all(int, const double *, double *, int *);")
+    lib: Any = ffi.dlopen(str(library), ffi.RTLD_NOW | ffi.RTLD_GLOBAL)
+    assert lib.genhex_load() == 0
+    start = np.concatenate([home.position, np.degrees(home.rpy)])
+    world, joints = np.tile(start, (len(legs), 1)), np.ascontiguousarray(legs)
+    codes = np.zeros(len(legs), np.int32)
+    begin = time.perf_counter()
+    lib.genhex_all(
+        len(legs), ffi.from_buffer("double[]", joints), ffi.from_buffer("double[]", world),
+        ffi.from_buffer("int[]", codes),
+    )  # fmt: skip
+    seconds = time.perf_counter() - begin
+    return Pose.from_rpy(world[:, :3], np.radians(world[:, 3:])), codes, seconds
 
 
 # ---- sizes ----------------------------------------------------------------------------
