@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import support
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -248,3 +249,29 @@ def test_the_limit_of_a_cycle_is_the_pivots_translation(reference):
     further = gough.Pose.from_euler(pose.position + np.array([0, 0, 1.5]), [0.01, 0, 0])
     tracker.update(gough.leg_lengths(platform, further))
     assert tracker.event == Event.JUMPED
+
+
+# ---- twist ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["reference", "rubin_camera", "reachy_mini"])
+def test_twist_comes_from_two_poses_or_from_given_rates(name: str) -> None:
+    platform, period = gough.Platform.load(name), 0.001
+    assert platform.workspace is not None
+    rate = np.concatenate([platform.workspace.translation[:, 1], [0.1, -0.2, 0.1]])
+    tracker = gough.Tracker(platform, start=platform.home, period=period)
+    assert np.all(np.isnan(tracker.twist))  # nothing has been followed yet
+    for cycle in range(1, 6):
+        pose = support.moved(platform.home, rate * cycle * period)
+        legs = gough.leg_lengths(platform, pose)
+        if cycle == 3:
+            legs[1] = np.nan
+        tracker.update(legs)
+        known = cycle != 3  # and the mean over two cycles after that
+        expected = rate if known else np.full(6, np.nan)
+        np.testing.assert_allclose(tracker.twist, expected, rtol=1e-6, atol=1e-9)
+    given = gough.leg_rates(platform, pose, rate)
+    tracker.update(legs, given)
+    np.testing.assert_allclose(tracker.twist, rate, rtol=1e-9)
+    tracker.update(legs)
+    np.testing.assert_allclose(tracker.twist, np.zeros(6), atol=1e-8)

@@ -26,8 +26,11 @@ def path(platform: Platform, count: int, seed: int, cycles: float = 2000.0) -> P
     return Pose(platform.home.position + x[:, :3], turned.wxyz)
 
 
-def faulty(platform: Platform, pose: Pose, seed: int) -> Floats:
-    """Readings (N, 6) of poses (N,) with faults of every kind, about one in fifty cycles."""
+def faulty(platform: Platform, pose: Pose, seed: int) -> tuple[Floats, NDArray[np.bool_]]:
+    """Readings (N, 6) of poses (N,) with faults of every kind, and which rows (N,) have one.
+
+    Rows after the machine has jumped elsewhere are good ones again.
+    """
     clean = leg_lengths(platform, pose)
     rng, legs, count = np.random.default_rng(seed), clean.copy(), len(clean)
     span = float(np.ptp(clean, axis=0).max())
@@ -39,9 +42,12 @@ def faulty(platform: Platform, pose: Pose, seed: int) -> Floats:
     for start in rng.integers(0, count, count // 10_000):  # two legs exchanged for a while
         a, b = rng.permutation(6)[:2]
         legs[start : start + 20, [a, b]] = legs[start : start + 20, [b, a]]
+    bad = np.any(legs != clean, axis=-1)
     for start in rng.integers(0, count, count // 6000):  # the machine is elsewhere for good
-        legs[start : start + 1500] = np.roll(clean, count // 2, axis=0)[start : start + 1500]
-    return legs
+        part = slice(start, start + 1500)
+        legs[part] = np.roll(clean, count // 2, axis=0)[part]
+        bad[part] = False
+    return legs, bad
 
 
 def tracked(tracker: Tracker, legs: Floats) -> tuple[Pose, NDArray[np.int32], NDArray[np.int32]]:

@@ -119,11 +119,14 @@ def _limits(precision: Precision) -> list[str]:
 
 
 def _loosened(c: Array, platform: Platform, precision: Precision) -> Array:
-    """The constants with the workspace widened by what numbers of this kind round away."""
+    """The constants with workspace and stroke widened by what numbers of this kind round away."""
     loose = c.copy()
     extra = precision.slack - SLACK
     loose[layout.BOX_LOW : layout.BOX_LOW + 3] -= extra
     loose[layout.BOX_HIGH : layout.BOX_HIGH + 3] += extra
+    unit = 1.0 if platform.rotary is not None else platform.size
+    outward = np.tile([-1.0, 1.0], 6) / np.repeat(np.abs(platform.gain), 2)
+    loose[layout.STROKE : layout.STROKE + 12] += extra * unit * outward
     if extra > 0 and platform.workspace is not None:
         low, high = np.radians(platform.workspace.rotation_deg.T)
         half = (high - low) / 2 + precision.slack

@@ -7,6 +7,8 @@ import reprlib
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gough import quaternion, velocities
+from gough.checks import Array
 from gough.errors import GoughError
 from gough.fk.solve import Solver
 from gough.kernel import layout
@@ -38,6 +40,9 @@ class Tracker:
         status: `Status` of the last reading.
         event: `Event` of the last cycle.
 
+    `twist` gives the velocity: from the rates passed to the last `update`, else from the last two
+    poses.
+
     Example:
         >>> platform = gough.Platform.load("reference")
         >>> tracker = gough.Tracker(platform, start=platform.home)
@@ -55,6 +60,7 @@ class Tracker:
         confirm: int = 3,
         tolerance: float = 1e-12,
         singular: float = SINGULAR,
+        period: float = 1.0,
     ) -> None:
         """Compile or load what a cycle needs, so that the first `update` is as quick as others.
 
@@ -65,6 +71,7 @@ class Tracker:
             max_turn: largest rotation in one cycle [rad].
             confirm: how many readings must agree on a place too far away before it is taken.
             tolerance, singular: as for `gough.solve`.
+            period: time of one cycle [s], for `twist`; unless given, rates are per cycle.
 
         Raises:
             GoughError: a limit that is not above zero.
@@ -72,8 +79,9 @@ class Tracker:
         self.platform = platform
         self._solver = Solver(platform, tolerance=tolerance, singular=singular, workers=1)
         self._max_shift = 0.02 * platform.size if max_shift is None else max_shift
-        self._max_turn, self._confirm = max_turn, confirm
+        self._max_turn, self._confirm, self._period = max_turn, confirm, period
         limits = {"max_shift": self._max_shift, "max_turn": max_turn, "confirm": confirm}
+        limits["period"] = period
         for name, value in limits.items():
             if not value > 0:
                 raise GoughError(f"{name}: expected a number above 0, found {value!r}")
@@ -83,6 +91,9 @@ class Tracker:
         self._state = np.zeros((1, STATE))
         self._buffer, self._work = np.zeros(layout.COMPONENTS), np.zeros((4, 6, 6))
         self._position, self._wxyz = np.zeros((1, 3)), np.zeros((1, 4))
+        self._last_position, self._last_wxyz = np.zeros((1, 3)), np.zeros((1, 4))
+        self._elapsed = 1  # cycles since the last pose
+        self._rates: ArrayLike | None = None
         self._missed, self._agreeing = 0, 0
         self._candidate: Pose | None = None
         self.pose = Pose.trusted(self._position[0], self._wxyz[0])
@@ -98,10 +109,31 @@ class Tracker:
         """Status of the last reading."""
         return Status(self._code)
 
-    def update(self, legs: ArrayLike | Table) -> Pose:
+    @property
+    def twist(self) -> Array:
+        """Twist (6,) of the platform in the last cycle, in base coordinates.
+
+        Velocity of the pose's position [platform unit / s] and angular velocity [rad / s]; per
+        cycle unless `period` was given. At the pose itself if the last `update` was given the rates
+        of its readings, else the mean between the last two poses. NaN after a cycle that did not
+        follow its reading.
+        """
+        if self.event != Event.FOLLOWED:
+            return np.full(6, np.nan)
+        if self._rates is not None:
+            return velocities.twist(self.platform, self.pose, self._rates)
+        turn = quaternion.product(self._wxyz[0], quaternion.conjugate(self._last_wxyz[0]))
+        moved = self._position[0] - self._last_position[0]
+        motion = np.concatenate([moved, quaternion.to_rotation_vector(turn)])
+        return motion / (self._period * self._elapsed)
+
+    def update(self, legs: ArrayLike | Table, leg_rates: ArrayLike | None = None) -> Pose:
         """Return the pose at the next reading (6,); `status` and `event` say how good it is.
 
         A row of a pandas table is a reading, too: it is read by its labels, leg_1 to leg_6.
+
+        Args:
+            leg_rates: (6,) rates of the readings [1 / s], for `twist`.
 
         Raises:
             GoughError: not six numbers. A reading that is NaN or impossible raises nothing.
@@ -114,6 +146,8 @@ class Tracker:
             self._legs[0] = legs
         except (TypeError, ValueError) as error:
             raise GoughError(f"legs: expected six numbers, found {reprlib.repr(legs)}") from error
+        self._rates, self._elapsed = leg_rates, self._missed + 1
+        self._last_position[:], self._last_wxyz[:] = self._position, self._wxyz
         code = FAILED if self._lost else self._run_cycle()
         if code >= layout.OPEN:
             self._recover(code)
