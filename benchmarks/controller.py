@@ -64,7 +64,7 @@ def event_table(folder: Path, count: int) -> None:
     A tenth of them for float.
     """
     print(f"| {count:,} readings, half of them with faults | the same event as in Python "
-          "| another, since other starts are tried later | then equal again, cycles after the fault "
+          "| another, as other starts are tried later | then equal again, cycles after the fault "
           "| another without that reason | position error / size, double; float "
           "| rotation error, rad, double; float |")  # fmt: skip
     print("|---|---|---|---|---|---|---|")
