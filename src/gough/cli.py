@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import os
 import re
 import signal
 import sys
+import textwrap
 from contextlib import suppress
 from importlib import import_module
 
@@ -15,6 +17,7 @@ from gough.commands import COMMANDS, signals
 from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
+WIDTH = 79  # of help texts
 EXTRAS = {"matplotlib": "plot", "viser": "view"} | dict.fromkeys(
     ("torch", "roma", "safetensors", "onnx", "onnxscript", "scipy", "tensorboard"), "learn"
 )
@@ -94,8 +97,7 @@ def _call_command(arguments: list[str]) -> int:
     module, function, _ = COMMANDS[command]
     run = getattr(import_module(module), function)
     for each in run.values() if isinstance(run, dict) else [run]:
-        # one line for each option's help, which tyro wraps to the width of the screen
-        each.__doc__ = re.sub(r"\n {12}", " ", each.__doc__ or "")
+        each.__doc__ = _laid_out(each.__doc__ or "")
     # flags are --flag alone, without a --no-flag beside it
     config = (tyro.conf.FlagCreatePairsOff,)
     if isinstance(run, dict):  # a family of commands, by name
@@ -103,6 +105,19 @@ def _call_command(arguments: list[str]) -> int:
             run, prog=f"gough {command}", args=rest, config=config
         )
     return tyro.cli(run, prog=f"gough {command}", args=rest, config=config)
+
+
+def _laid_out(docstring: str) -> str:
+    """A docstring with paragraphs that fit a screen, and one line for each option.
+
+    tyro wraps the options; of other paragraphs it joins all lines that begin with a letter.
+    """
+    text, head, options = inspect.cleandoc(docstring).partition("\nArgs:")
+    paragraphs = [
+        "\n".join(textwrap.wrap(paragraph, WIDTH, subsequent_indent="  "))
+        for paragraph in text.split("\n\n")
+    ]
+    return "\n\n".join(paragraphs) + head + re.sub(r"\n {8}", " ", options)
 
 
 def _help() -> str:

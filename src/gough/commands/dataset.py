@@ -20,7 +20,7 @@ def run(
     same_assembly: SameAssembly = False,
     processes: int = 1,
 ) -> int:
-    """Make a data set of poses and readings, as the DisGNet paper does, for any platform.
+    """Make poses and readings to train on, as the DisGNet paper does.
 
     gough dataset -p reference -o data.parquet
 

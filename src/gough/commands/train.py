@@ -38,7 +38,7 @@ def run(
     workspace: WorkspaceBox = None,
     preset: Annotated[Preset, arg(name="")] = PRESETS["default"],  # pyright: ignore[reportInvalidTypeForm]
 ) -> int:
-    """Train a first guess for a platform; this takes ten minutes unless --budget says otherwise.
+    """Train a first guess for a platform, for ten minutes unless --budget is given.
 
     gough train -p my.toml -o runs/mine
 

@@ -21,7 +21,8 @@ from gough.files.log_format import LogFormat
 from gough.files.rows import MISSING, Block, Conversions
 
 HEAD = 1 << 16  # bytes read to find the header
-LONGEST_LINE = 1 << 24  # bytes; a "line" beyond it means wrong line ends or an open quote
+LONGEST_HEADER = 1 << 19  # bytes
+LONGEST_LINE = 1 << 22  # bytes; a "line" beyond it means wrong line ends or an open quote
 
 
 class CsvSource:
@@ -53,10 +54,13 @@ class CsvSource:
         ended = len(start) < HEAD
         start = start.removeprefix(b"\xef\xbb\xbf")
         while not ended and not _last_line_end(start, len(start)):
-            more = self._read(HEAD)
+            more = self._read(len(start))
             start, ended = start + more, not more
-            if len(start) > LONGEST_LINE:
-                raise InputError(f"{where}: line 1 has no end; expected lines of text")
+            if len(start) > LONGEST_HEADER:
+                raise InputError(
+                    f"{where}: line 1 has no end within {LONGEST_HEADER >> 10} kB; expected lines "
+                    "of text that end with LF or CRLF"
+                )
         whole = start if ended else start[: _last_line_end(start, len(start))]
         self.layout = find_layout(where, whole, log)
         self.columns, self.units = self.layout.names, self.layout.units
