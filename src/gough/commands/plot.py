@@ -99,7 +99,7 @@ def workspace(
         tuple[float, float, float, float] | None,
         arg(metavar="A1 A2 B1 B2", help_behavior_hint=""),
     ] = None,
-    resolution: Annotated[int, arg(metavar="N")] = 361,
+    resolution: Annotated[int, arg(metavar="N")] = 271,
     out: Picture = None,
 ) -> int:
     """Draw a slice of the workspace: distance to singularity, stroke limits.

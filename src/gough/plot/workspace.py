@@ -36,7 +36,7 @@ NEAR_ZERO = 0.25  # colours begin at 0 where the least distance / largest is bel
 RIM = "#22222266"  # around lines on colours
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 WIDEST = {"rx": 180.0, "ry": 90.0, "rz": 180.0}  # [deg] what Euler angles tell apart
-RESOLUTION = 361  # poses along each axis
+RESOLUTION = 271  # poses along each axis
 BEYOND = 1.25  # span of a slice / span of workspace and stroke
 
 
