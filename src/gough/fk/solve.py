@@ -18,7 +18,7 @@ from gough.kernel.threads import in_parts
 from gough.kinematics import pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.seeds.base import PoseSeed, Seed, find_seed, further_starts, starting_poses
+from gough.seeds.base import PoseSeed, Seed, Start, find_seed, further_starts, starting_poses
 from gough.status import USABLE, Status
 from gough.tables import Table, TableInfo, as_readings, table_info
 
@@ -149,13 +149,17 @@ class Solver:
             InputError: a table without these columns, or with something else than numbers there.
         """
         readings = as_readings(legs)
-        # a copy if need be: compiled code is made for writeable, contiguous arrays only
-        flat = np.require(readings.reshape(-1, 6), requirements=["C", "W"])
+        flat = readings.reshape(-1, 6)
+        if not (flat.flags.c_contiguous and flat.flags.writeable):
+            flat = flat.copy()  # compiled code is made for such arrays alone
         rows = Rows.empty(len(flat))
         start = starting_poses(self.platform, self.seed, flat)
-        if len(flat) > FEW:
-            self._solve_blocks(flat, start, rows)
-        self._solve_open_rows(flat, start, rows)
+        if len(flat) <= FEW:
+            invalid = self._solve_rows(flat, np.arange(len(flat)), start, rows, part=256)
+        else:
+            invalid = self._solve_blocks(flat, start, rows)
+        if invalid:
+            rows.fill_invalid_with_nan()
         radius = self._certify(flat, rows) if certify else None
         if ambiguous:
             self._mark_ambiguous(flat, rows)
@@ -170,8 +174,11 @@ class Solver:
         legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
         replace(self, seed="home")(legs, certify=certify)
 
-    def _solve_blocks(self, legs: Array, start, rows: Rows) -> None:
-        """Plain Newton on all rows; rows that it does not settle keep the status OPEN."""
+    def _solve_blocks(self, legs: Array, start: Start, rows: Rows) -> int:
+        """Take plain Newton steps on all rows, then solve those that it leaves open.
+
+        Returns 0 where no row is invalid.
+        """
         from gough.kernel.block import solve_blocks
 
         constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
@@ -183,25 +190,31 @@ class Solver:
             guess = start(slice(first, last))
             return solve_blocks(constants, legs, guess, tolerance, steps, first, last, scratch, out)
 
-        in_parts(work, len(legs), self.workers)
+        troubled = in_parts(work, len(legs), self.workers)
+        if troubled:
+            chosen = np.flatnonzero(rows.status == OPEN)
+            self._solve_rows(legs, chosen, start, rows, part=64)
+        return troubled
 
-    def _solve_open_rows(self, legs: Array, start, rows: Rows) -> None:
-        """Solve every row that is still open one by one; set the results of invalid rows to NaN."""
-        chosen = np.flatnonzero(rows.status == OPEN)
+    def _solve_rows(
+        self, legs: Array, chosen: NDArray[np.intp], start: Start, rows: Rows, part: int
+    ) -> int:
+        """Solve chosen rows (K,) one by one, `part` of them at a time on each thread.
+
+        Returns how many are invalid.
+        """
         constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
         starts = further_starts(self.platform, int(self.restarts) if self.max_iterations else 0)
         # a given pose says which assembly mode is meant
-        stays = isinstance(self.seed, PoseSeed)
-        settings = np.array([self.tolerance, self.max_iterations, self.singular, stays])
+        stays = float(isinstance(self.seed, PoseSeed))
+        settings = np.array([self.tolerance, self.max_iterations, self.singular, stays], float)
 
         def work(first: int, last: int) -> int:
-            part = chosen[first:last]
+            some = chosen[first:last]
             scratch = np.zeros(COMPONENTS), np.zeros(COMPONENTS), np.zeros((4, 6, 6))
-            solve_rows(constants, legs, part, start(part), starts, settings, scratch, out)
-            return 0
+            return solve_rows(constants, legs, some, start(some), starts, settings, scratch, out)
 
-        in_parts(work, len(chosen), self.workers, chunk=64, serial=64)
-        rows.fill_invalid_with_nan()
+        return in_parts(work, len(chosen), self.workers, chunk=part, serial=part)
 
     def _certify(self, legs: Array, rows: Rows) -> Array:
         """Radii of uniqueness (N,) [platform unit], 0 where unproven; promote converged rows."""

@@ -34,13 +34,16 @@ def evaluate(polynomial, legs, work, out):
     u, total, monomials = work
     half = np.uint64(len(monomials)) // TWO
     for start in range(0, len(legs), WIDTH):
+        for k in range(WIDTH):
+            row = start + k if start + k < len(legs) else len(legs) - 1
+            for leg in range(6):
+                total[leg * WIDTH + k] = legs[row, leg]
         for leg in range(6):
-            for k in range(WIDTH):
-                row = start + k if start + k < len(legs) else len(legs) - 1
-                value = (legs[row, leg] - scaling[0, leg]) * scaling[1, leg]
-                value = value if value < CLAMP else CLAMP
-                value = value if value > -CLAMP else -CLAMP
-                u[leg * WIDTH + k] = value if legs[row, leg] == legs[row, leg] else 0.0
+            centre, factor, at = scaling[0, leg], scaling[1, leg], np.uint64(leg) * SPAN
+            for k in range(SPAN):
+                value = (total[at + k] - centre) * factor
+                value = value if value < CLAMP else (CLAMP if value == value else 0.0)
+                u[at + k] = value if value > -CLAMP else -CLAMP
         for o in range(6):
             for k in range(WIDTH):
                 total[o * WIDTH + k] = coefficients[0, o]
@@ -52,8 +55,12 @@ def evaluate(polynomial, legs, work, out):
             _multiply(monomials, lower, u, upper, parent, variable, first, last)
             _accumulate(coefficients, monomials, upper, total, first, last)
             lower, upper = upper, lower
+        _decode(total, u, turn)
         for k in range(WIDTH if start + WIDTH < len(legs) else len(legs) - start):
-            _decode(total, k, turn, out, start + k)
+            for c in range(3):
+                out[start + k, c] = total[c * WIDTH + k]
+            for c in range(4):
+                out[start + k, 3 + c] = u[c * WIDTH + k]
 
 
 @inline
@@ -87,22 +94,22 @@ def _accumulate(coefficients, monomials, upper, total, first, last):
 
 
 @inline
-def _decode(total, k, turn, out, row):
-    """Copy six outputs to row `row` of out (N, 7): position, then the rotation as a quaternion.
+def _decode(total, wxyz, turn):
+    """Rotations of a block as quaternions, component c of pose k at wxyz[c * WIDTH + k].
 
-    With u the last three outputs, (turn[4] + sqrt(1 - u.u), u) is along the quaternion of the
-    rotation from the reference turn[:4].
+    With u the last three of the six outputs, (turn[4] + sqrt(1 - u.u), u) is along the quaternion
+    of the rotation from the reference turn[:4].
     """
-    a, b, c = total[3 * WIDTH + k], total[4 * WIDTH + k], total[5 * WIDTH + k]
-    rest = 1 - a * a - b * b - c * c
-    s = turn[4] + sqrt(rest if rest > 0 else 0.0)
-    w, x, y, z = turn[0], turn[1], turn[2], turn[3]
-    out[row, 0], out[row, 1], out[row, 2] = total[k], total[WIDTH + k], total[2 * WIDTH + k]
-    w, x, y, z = (
-        s * w - a * x - b * y - c * z,
-        s * x + a * w + b * z - c * y,
-        s * y + b * w + c * x - a * z,
-        s * z + c * w + a * y - b * x,
-    )
-    norm = 1 / sqrt(w * w + x * x + y * y + z * z)
-    out[row, 3], out[row, 4], out[row, 5], out[row, 6] = w * norm, x * norm, y * norm, z * norm
+    w, x, y, z, offset = turn[0], turn[1], turn[2], turn[3], turn[4]
+    o2, o3, o4, o5 = SPAN * TWO, SPAN * THREE, SPAN * FOUR, SPAN * FIVE
+    for k in range(SPAN):
+        a, b, c = total[o3 + k], total[o4 + k], total[o5 + k]
+        rest = 1 - a * a - b * b - c * c
+        s = offset + sqrt(rest if rest > 0 else 0.0)
+        q0 = s * w - a * x - b * y - c * z
+        q1 = s * x + a * w + b * z - c * y
+        q2 = s * y + b * w + c * x - a * z
+        q3 = s * z + c * w + a * y - b * x
+        norm = 1 / sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+        wxyz[k], wxyz[SPAN + k] = q0 * norm, q1 * norm
+        wxyz[o2 + k], wxyz[o3 + k] = q2 * norm, q3 * norm

@@ -56,13 +56,18 @@ def solve_rows(constants, legs, rows, guess, starts, settings, work, out):
         work: (COMPONENTS,), (COMPONENTS,) and (4, 6, 6) to work in.
         out: position (N, 3), wxyz (N, 4), residual (N,) [platform unit], iterations (N,),
             status (N,).
+
+    Returns:
+        How many of the rows are invalid; nothing but their status is written.
     """
     position, wxyz, residuals, iterations, statuses = out
     buffer, best, matrices = work
+    invalid = 0
     for n in range(len(rows)):
         row = rows[n]
         if not put_reading(constants, legs, row, buffer, FIRST, SINGLE):
             statuses[row] = INVALID_INPUT
+            invalid += 1
             continue
         outcome, count = _solve_row(constants, buffer, guess, n, starts, settings, matrices, best)
         if outcome == SOLVED:
@@ -74,6 +79,7 @@ def solve_rows(constants, legs, rows, guess, starts, settings, work, out):
         get_pose(buffer, FIRST, SINGLE, position, wxyz, row)
         residuals[row] = buffer[RESIDUAL] * constants[SIZE]
         iterations[row] = count
+    return invalid
 
 
 @inner

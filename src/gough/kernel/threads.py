@@ -28,6 +28,8 @@ def in_parts(
         chunk: rows of a part.
         serial: up to this count one thread does all parts.
     """
+    if 0 < count <= min(chunk, serial):
+        return work(0, count)
     parts = [(i, min(i + chunk, count)) for i in range(0, count, chunk)]
     threads = workers or cores()
     if threads <= 1 or count <= serial:

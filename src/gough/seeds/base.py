@@ -72,7 +72,10 @@ class PoseSeed:
         )
 
 
-def starting_poses(platform: Platform, seed: Seed, legs: Array) -> Callable[[Any], Array]:
+Start = Callable[[Any], Array]  # internal poses (K, 7) of K rows, by a slice or indices
+
+
+def starting_poses(platform: Platform, seed: Seed, legs: Array) -> Start:
     """Return a function that gives the internal poses (K, 7) that K rows start from.
 
     A `KernelSeed` of this platform guesses when the function is called, any other now.

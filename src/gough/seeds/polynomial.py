@@ -71,7 +71,9 @@ class PolynomialSeed:
 
     def kernel_poses(self, legs: Array) -> Array:
         """The same poses in the solver's internal form, (N, 7)."""
-        return self.polynomial(np.require(legs, requirements=["C", "W"]))
+        if not (legs.flags.c_contiguous and legs.flags.writeable):
+            legs = legs.copy()  # compiled code is made for such arrays alone
+        return self.polynomial(legs)
 
 
 @dataclass(frozen=True, eq=False)
