@@ -1,4 +1,4 @@
-"""How quick the page is: from the command to a drawn machine, and while a slider is dragged.
+"""Speed of the page: from the command to a drawn machine, and while a slider is dragged.
 
     python benchmarks/view.py      # about a minute; needs Chromium
 
@@ -34,7 +34,7 @@ from gough.view.viewer import Viewer
 MACHINES = ("reference", "reachy_mini", "rubin_camera")
 WINDOWS = ((640, 480), (1360, 900))
 SECONDS = 5.0
-WISHES = 120  # slider positions sent in a second
+RATE = 120  # slider positions sent in a second
 
 # drags a slider by as many events as frames, and counts the frames that had something new
 DRAG = """async ([row, seconds]) => {
@@ -105,7 +105,7 @@ def over_the_wire(name: str) -> tuple[float, float]:
                 update = {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid}
                 wire.send(msgspec.msgpack.encode(update | {"updates": {"value": float(value)}}))
                 sent += 1
-                time.sleep(max(0.0, begin + sent / WISHES - time.perf_counter()))
+                time.sleep(max(0.0, begin + sent / RATE - time.perf_counter()))
             came = len(places)
             stop.set()
             reader.join()
@@ -113,7 +113,7 @@ def over_the_wire(name: str) -> tuple[float, float]:
 
 
 def _camera() -> bytes:
-    """What a browser says first."""
+    """First message of a browser."""
     message = {
         "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (1.0, 1.0, 1.0),
         "fov": 0.7, "near": 0.01, "far": 100.0, "look_at": (0.0, 0.0, 0.0),
@@ -123,7 +123,7 @@ def _camera() -> bytes:
 
 
 def _read(wire, places: set[tuple], stop: threading.Event) -> None:
-    """Collect the different places of the plate that arrive."""
+    """Collect the different positions of the plate that arrive."""
     unpack = zstandard.ZstdDecompressor()
     while not stop.is_set():
         try:
@@ -148,12 +148,12 @@ def start_table(browser: Browser) -> None:
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             address = process.stdout.readline().split()[3]
-            told = time.perf_counter() - begin
+            announced = time.perf_counter() - begin
             drawn(page, address)
             seen = time.perf_counter() - begin
             process.terminate()
         page.close()
-        print(f"| {name} | {told:.2f} s | {seen:.2f} s |", flush=True)
+        print(f"| {name} | {announced:.2f} s | {seen:.2f} s |", flush=True)
 
 
 def drag_table(browser: Browser) -> None:

@@ -17,13 +17,13 @@ FLAGS = (
 
 
 def find() -> str | None:
-    """Where the system's Chromium is; None where there is none."""
+    """Path of the system's Chromium, or None."""
     return shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 @contextmanager
 def running(path: str) -> Iterator[Browser]:
-    """The Chromium at this path, without a screen, drawing in software."""
+    """Run the Chromium at `path` without a screen, drawing in software."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
         try:

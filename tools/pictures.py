@@ -1,4 +1,4 @@
-"""Make the pictures of the documents by the commands that stand beside them.
+"""Make the pictures of the documents by the commands printed above them.
 
     python tools/pictures.py            (make pictures)
 
@@ -23,14 +23,14 @@ BLOCK = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def commands(page: Path = PAGE) -> list[str]:
-    """The `gough` lines of a page, lines that go on after a backslash joined."""
+    """List the `gough` lines of a page, continued lines joined."""
     blocks = [block.replace("\\\n", " ") for block in BLOCK.findall(page.read_text("utf-8"))]
     lines = [" ".join(line.split()) for block in blocks for line in block.splitlines()]
     return [line.partition(" #")[0] for line in lines if line.startswith("gough ")]
 
 
 def make(images: Path = IMAGES) -> list[Path]:
-    """Run the commands; the pictures that were made."""
+    """Run the commands; returns the paths of the pictures."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "examples").symlink_to(ROOT / "examples")
         for line in commands():

@@ -1,4 +1,4 @@
-"""The picture of `gough view` in the documents, by headless Chromium.
+"""Make the picture of `gough view` in the documents, by headless Chromium.
 
 python tools/view_picture.py docs/images/view.png
 """
@@ -14,11 +14,11 @@ from PIL import Image
 from gough import Platform
 from gough.view.viewer import Viewer
 
-PATIENCE = 120_000  # [ms]
+PATIENCE = 300_000  # [ms]
 
 
 def main(path: str) -> None:
-    """Drive the page to a pose, and write what it shows."""
+    """Move the machine to a pose, and write a screenshot of the page."""
     found = chromium.find()
     if found is None:
         sys.exit(chromium.MISSING)
@@ -29,6 +29,7 @@ def main(path: str) -> None:
         page = browser.new_page(viewport={"width": 1200, "height": 800})
         page.set_default_timeout(PATIENCE)
         page.goto(f"http://localhost:{v.port}")
+        page.wait_for_selector("[data-gough=status]")
         page.locator("[data-gough=note]").wait_for(state="detached")
         page.locator(".mantine-Notification-closeButton").click()
         boxes = page.locator(".mantine-NumberInput-input")

@@ -17,7 +17,7 @@ FIGURES = workshop.FIGURES | explain.FIGURES | measured.FIGURES
 
 
 def draw(names: list[str], folder: Path = IMAGES) -> None:
-    """Write the figures of these names, all of them if there are none."""
+    """Write the named figures; without names, all."""
     for name in names or FIGURES:
         if name not in FIGURES:
             sys.exit(f"no figure is called {name!r}; there are {', '.join(FIGURES)}")

@@ -1,4 +1,4 @@
-"""Sketches of what the formulas say: the leg, its rate of change, the certificate's parabola."""
+"""Sketches of formulas: the leg, its rate of change, the certificate's parabola."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, arrow, figure, la
 
 
 def leg_equation() -> Figure:
-    """Left the vectors of one leg, right how a small motion of the platform changes it."""
+    """Draw the vectors of one leg, and its change in a small motion of the platform."""
     whole = figure(6.8, 3.3)
     left, right = whole.subplots(1, 2)
     _vectors(left)
@@ -59,7 +59,7 @@ def _rate(axes: Axes) -> None:
 
 
 def _plates(axes: Axes, foot, centre, head) -> None:
-    """Base and platform as bars with their joints."""
+    """Draw base and platform as bars with their joints."""
     axes.plot([-1.1, 2.5], [-0.02, 0.33], color="#d0d0d0", linewidth=7, solid_capstyle="round")
     across = (head - centre) / np.linalg.norm(head - centre)
     bar = centre + across * np.array([[-1.1], [1.25]])
@@ -71,7 +71,7 @@ def _plates(axes: Axes, foot, centre, head) -> None:
 
 
 def certificate() -> Figure:
-    """Where a ball of radius rho lands, against rho: below the diagonal it maps into itself."""
+    """Draw the image radius of a ball of radius rho; below the diagonal it maps into itself."""
     whole = figure(5.4, 3.5)
     axes = whole.subplots()
     beta, delta, kappa = 0.06, 0.12, 0.85

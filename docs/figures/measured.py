@@ -23,7 +23,7 @@ import gough
 
 
 def newton() -> Figure:
-    """How far first guesses are off, and how the error falls from step to step."""
+    """Draw the errors of first guesses, and of the steps of Newton's method after them."""
     platform = gough.Platform.load("reference")
     true = platform.sample_poses(5000, seed=5)
     legs = gough.leg_lengths(platform, true)
@@ -47,7 +47,7 @@ def newton() -> Figure:
 
 
 def two_modes() -> Figure:
-    """A point on two legs, and a hexapod on six: the same lengths, more than one place."""
+    """Draw the places of a point on two legs, and poses of a hexapod, with equal lengths."""
     whole = figure(6.8, 2.8)
     left, right = whole.subplots(1, 2, width_ratios=[1, 1.5])
     _two_circles(left)
@@ -93,7 +93,7 @@ def _three_poses(axes: Axes) -> None:
 
 
 def singularity() -> Figure:
-    """The reference platform turned about its axis: distance to singularity, error of the pose."""
+    """Draw distance to singularity and pose error of the reference platform, rotated about z."""
     platform = gough.Platform.load("reference")
     angle = np.linspace(0, 120, 481)
     turn = np.stack([0 * angle, 0 * angle, np.radians(angle)], axis=-1)
@@ -120,7 +120,7 @@ def singularity() -> Figure:
 
 
 def control_loop() -> Figure:
-    """A tracker through a dropout, a bad reading and a sensor that moved: held, then found."""
+    """Draw a tracker through a dropout, a bad reading and a sensor whose zero moved."""
     platform = gough.Platform.load("reference")
     time = np.arange(120)
     side = 20 * np.sin(time / 20)

@@ -1,4 +1,4 @@
-"""What all figures share: colours, arrows, dimensions, files that come out the same each time."""
+"""Parts of all figures: colours, arrows, dimensions, files with the same bytes each time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ matplotlib.rcParams.update(
 
 
 def figure(width: float, height: float) -> Figure:
-    """An empty figure [inch] on white, so that it can be read on dark pages too."""
+    """Make an empty figure [inch] on white, readable on dark pages too."""
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
@@ -43,13 +43,13 @@ def save(drawn: Figure, name: str, folder: Path = IMAGES) -> None:
 
 
 def sketch(axes: Axes) -> None:
-    """Make axes a drawing: equal scales, no frame."""
+    """Set equal scales, and hide the frame."""
     axes.set_aspect("equal")
     axes.set_axis_off()
 
 
 def arrow(axes: Axes, start, end, color: str = BLACK, width: float = 1.2, style="-|>") -> None:
-    """An arrow from point to point; "<|-|>" has two heads, as a dimension has."""
+    """Draw an arrow between two points; "<|-|>" has two heads, for dimensions."""
     axes.annotate(
         "", xy=end, xytext=start,
         arrowprops={
@@ -60,14 +60,14 @@ def arrow(axes: Axes, start, end, color: str = BLACK, width: float = 1.2, style=
 
 
 def label(axes: Axes, at, text: str, color: str = BLACK, size: float = 9, **more) -> None:
-    """Words at a point, on white, so that lines below do not cross them."""
+    """Write text at a point, on white, so that lines below do not cross it."""
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
     middle = {"ha": "center", "va": "center", "bbox": box, "zorder": 6}
     axes.text(*at, text, color=color, fontsize=size, **(middle | more))
 
 
 def dimension(axes: Axes, start, end, text: str, ends=()) -> None:
-    """A dimension line with its number, and thin lines from the `ends` that it measures."""
+    """Draw a dimension line with its number, and thin lines from the measured `ends`."""
     for near, far in zip((start, end), ends, strict=False):
         axes.plot(*np.transpose([near, far]), color=GREY, linewidth=0.5)
     arrow(axes, start, end, width=0.7, style="<|-|>")
@@ -75,7 +75,7 @@ def dimension(axes: Axes, start, end, text: str, ends=()) -> None:
 
 
 def arc(axes: Axes, radius: float, low_deg: float, high_deg: float, **line) -> None:
-    """Part of a circle about the origin."""
+    """Draw part of a circle about the origin."""
     turn = np.radians(np.linspace(low_deg, high_deg, 181))
     axes.plot(radius * np.cos(turn), radius * np.sin(turn), **line)
 
@@ -87,7 +87,7 @@ def polar(radius: float, degrees) -> np.ndarray:
 
 
 def oblique(points: np.ndarray, turn_deg: float = -35, tilt_deg: float = 22) -> np.ndarray:
-    """Points (..., 3) seen from the front and somewhat above, (..., 2)."""
+    """Project points (..., 3) to (..., 2), seen from the front and somewhat above."""
     turn, tilt = np.radians(turn_deg), np.radians(tilt_deg)
     x = points[..., 0] * np.cos(turn) - points[..., 1] * np.sin(turn)
     depth = points[..., 0] * np.sin(turn) + points[..., 1] * np.cos(turn)

@@ -27,7 +27,7 @@ PLATE_DEG = np.array([-52, 52, 68, 172, 188, 292])
 
 
 def drawing() -> Figure:
-    """Plan, elevation and a strut, with dimensions."""
+    """Draw plan, elevation and a strut, with dimensions."""
     whole = figure(6.4, 8.4)
     axes = whole.subplot_mosaic("aa;bc", width_ratios=[1.25, 1], height_ratios=[2.2, 1])
     _plan(axes["a"])
@@ -63,7 +63,7 @@ def _plan(axes: Axes) -> None:
 
 
 def _pair(axes: Axes, middle: float, half: float, radius: float, inner: float, color: str) -> None:
-    """The angle between the two joints of a pair, halved by a centre line."""
+    """Draw the angle between the two joints of a pair, halved by a centre line."""
     for degrees, start in ((middle, 0.55 * inner), (middle - half, inner), (middle + half, inner)):
         ends = polar(1, degrees) * np.array([[start], [radius + 12]])
         axes.plot(*ends.T, color=color, linewidth=0.5, linestyle=(0, (8, 2, 1, 2)))
@@ -116,7 +116,7 @@ def _strut(axes: Axes) -> None:
 
 
 def rotary_leg() -> Figure:
-    """The arm's plane: centre, angle, tip, rod, and the other elbow."""
+    """Draw the plane of an arm: centre, angle, tip, rod, and the other branch."""
     whole = figure(5.6, 3.4)
     axes = whole.subplots()
     sketch(axes)

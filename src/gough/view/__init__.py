@@ -1,1 +1,1 @@
-"""A machine in the browser: to look at, to drive by sliders and by hand, to keep as a page."""
+"""A machine in the browser: moved by sliders or by hand, playing a file, saved as a page."""

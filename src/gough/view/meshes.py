@@ -1,4 +1,4 @@
-"""What is drawn, as numbers: meshes, the parts of a leg, colours. Independent of the browser."""
+"""Meshes, parts of a leg and colours, as numbers: independent of the browser."""
 
 from __future__ import annotations
 
