@@ -41,7 +41,7 @@ def leg_rates(platform: Platform, pose: Pose, twist: ArrayLike) -> Array:
         >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> gough.leg_rates(platform, platform.home, [0, 0, 10, 0, 0, 0]).round(3)
-        array([9.063, 9.063, 9.063, 9.063, 9.063, 9.063])
+        array([9.153, 9.153, 9.153, 9.153, 9.153, 9.153])
     """
     return _times(jacobian(platform, pose), as_batch("twist", twist, (6,)))
 
@@ -64,7 +64,7 @@ def twist(platform: Platform, pose: Pose, leg_rates: ArrayLike) -> Array:
         >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> gough.twist(platform, platform.home, [10.0] * 6).round(3)[:3] + 0.0
-        array([ 0.   ,  0.   , 11.034])
+        array([ 0.   ,  0.   , 10.926])
     """
     return _solved(platform, pose, jacobian(platform, pose), as_batch("leg_rates", leg_rates, (6,)))
 
@@ -94,7 +94,7 @@ def leg_accelerations(
         >>> platform = gough.Platform.load("reference")
         >>> still, upward = [0.0] * 6, [0, 0, 10, 0, 0, 0]
         >>> gough.leg_accelerations(platform, platform.home, still, upward).round(3)
-        array([9.063, 9.063, 9.063, 9.063, 9.063, 9.063])
+        array([9.153, 9.153, 9.153, 9.153, 9.153, 9.153])
     """
     motion = as_batch("twist", twist, (6,))[..., None, :]
     change = as_batch("acceleration", acceleration, (6,))[..., None, :]
@@ -136,7 +136,7 @@ def wrench(platform: Platform, pose: Pose, leg_forces: ArrayLike) -> Array:
         >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> gough.wrench(platform, platform.home, [100.0] * 6).round(1)[2]
-        np.float64(543.8)
+        np.float64(549.2)
     """
     forces = as_batch("leg_forces", leg_forces, (6,))
     return _times(np.swapaxes(jacobian(platform, pose), -1, -2), forces)
@@ -164,7 +164,7 @@ def leg_forces(platform: Platform, pose: Pose, wrench: ArrayLike) -> Array:
         >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> gough.leg_forces(platform, platform.home, [0, 0, 600, 0, 0, 0]).round(1)
-        array([110.3, 110.3, 110.3, 110.3, 110.3, 110.3])
+        array([109.3, 109.3, 109.3, 109.3, 109.3, 109.3])
     """
     load = as_batch("wrench", wrench, (6,))
     return _solved(platform, pose, np.swapaxes(jacobian(platform, pose), -1, -2), load)

@@ -44,6 +44,7 @@ class Tracker:
     poses.
 
     Example:
+        >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> tracker = gough.Tracker(platform, start=platform.home)
         >>> tracker.update(platform.home_legs + 0.5).position.round(4)
