@@ -23,17 +23,17 @@ LABELS = tuple(status.label for status in Status)
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Poses with what is known about each.
+    """Poses of a batch of readings, with status and accuracy of each.
 
     Attributes:
         pose: batch axes (...) as the legs had; NaN where the input was invalid.
         status: (...) uint8, to be compared with `Status` members; a `Status` for a single row.
         residual: (...) largest difference between a strut's length at the pose and the length
-            that its reading asks for [platform unit]; NaN where the input was invalid.
+            that its reading stands for [platform unit]; NaN where the input was invalid.
         iterations: (...) int32, Newton steps taken, over all starts that were tried.
         covariance: (..., 6, 6) pose covariance, see `gough.pose_covariance`, or None.
         radius: (...) radius of uniqueness [platform unit], see `gough.Certificate`, 0 where
-            nothing is proven; None unless certificates were asked for.
+            nothing is proven; None without `certify=True`.
         unit: name of the platform's length unit, a label.
         table: library and row labels of the table of readings, if they came in one.
     """
@@ -53,7 +53,7 @@ class Solution:
         return np.isin(self.status, USABLE)
 
     def counts(self) -> dict[Status, int]:
-        """How many rows have each status that occurs, in the order of `Status`."""
+        """Return the number of rows of each status that occurs, in the order of `Status`."""
         numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
         return {s: int(numbers[s]) for s in Status if numbers[s]}
 

@@ -83,7 +83,7 @@ class Solver:
     Example:
         >>> solver = gough.Solver(gough.Platform.load("reference"), tolerance=1e-10)
         >>> solver(solver.platform.home_legs).usable
-        np.True_
+        array(True)
     """
 
     platform: Platform

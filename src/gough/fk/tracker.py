@@ -48,7 +48,7 @@ class Tracker:
         >>> platform = gough.Platform.load("reference")
         >>> tracker = gough.Tracker(platform, start=platform.home)
         >>> tracker.update(platform.home_legs + 0.5).position.round(4)
-        array([  0.    ,   0.    , 600.5454])
+        array([  0.    ,   0.    , 600.5462])
     """
 
     def __init__(

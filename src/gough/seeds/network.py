@@ -1,9 +1,8 @@
 """A trained network as a first guess, run by onnxruntime: PyTorch is not needed.
 
-A network's file is plain ONNX. Its metadata entry "gough" is a JSON text that says for which
-platform it is, in which unit, how its numbers stand for poses, and how it was trained; its last
-entry, "gough.sha256", is a checksum of all bytes before that entry, so a truncated or altered
-file is known before it is used.
+A network's file is plain ONNX. Its metadata entry "gough" is a JSON text that names its platform
+and unit, the meaning of its numbers and how it was trained; its last entry, "gough.sha256", is a
+checksum of all bytes before that entry, so that a truncated or altered file is refused.
 """
 
 from __future__ import annotations
@@ -39,8 +38,8 @@ class NetworkSeed:
     """A trained network for one platform; a `gough.seeds.base.Seed`.
 
     Attributes:
-        name: what the network is called in messages.
-        facts: what its file says: kind, parameters, configuration, training record, ...
+        name: name for messages.
+        facts: metadata of its file: kind, parameters, configuration, training record, ...
         leg_range: (6, 2) lowest and highest reading it was trained on.
     """
 
@@ -87,8 +86,13 @@ class NetworkSeed:
     def guess(self, legs: Array) -> Pose:
         """Poses (N,) for readings (N, 6), finite for finite readings.
 
-        Readings beyond those trained on are taken as the nearest that were: a network says
-        nothing sensible about what it never saw. `outside` tells which rows that concerns.
+        Readings outside the range trained on are moved to its nearest end, since a network's
+        values beyond it mean nothing. `outside` names the rows that this concerns.
+
+        Example:
+            >>> seed = gough.NetworkSeed.shipped(gough.Platform.load("reference"), "resmlp")
+            >>> seed.guess(seed.leg_range.mean(axis=1)[None]).batch
+            (1,)
         """
         legs = as_batch("legs", legs, (6,))
         flat = np.clip(legs.reshape(-1, 6), *self.leg_range.T)
@@ -99,7 +103,7 @@ class NetworkSeed:
         return self._decode(outputs.reshape(*legs.shape[:-1], outputs.shape[-1]))
 
     def outside(self, legs: Array) -> NDArray[np.bool_]:
-        """Which rows (N,) have a reading outside the range trained on, or NaN."""
+        """Return which rows (N,) have a reading outside the range trained on, or NaN."""
         inside = (legs >= self.leg_range[:, 0]) & (legs <= self.leg_range[:, 1])
         return ~np.all(inside, axis=-1)
 
@@ -119,7 +123,7 @@ class NetworkSeed:
 
 
 def nearest_rotations(matrices: Array) -> Array:
-    """U diag(1, 1, det(U V^T)) V^T of M = U S V^T, (..., 3, 3).
+    """Rotation nearest to each matrix M = U S V^T, U diag(1, 1, det(U V^T)) V^T, (..., 3, 3).
 
     Newton's iteration for the polar factor (Higham 1986), which converges in about five steps
     for matrices near a rotation, as a trained network's are; the others are decomposed.
@@ -174,7 +178,7 @@ def _unseal(content: bytes, where: str) -> bytes:
 
 
 def read_facts(content: bytes, where: str) -> dict:
-    """What the file of a network says about it.
+    """Read the metadata of a network's file.
 
     Raises:
         GoughError: a damaged file, or one of another format.
@@ -196,7 +200,7 @@ def _facts(body: bytes, where: str) -> dict:
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
-    """A protocol buffer's whole number at `at`, and where it ends."""
+    """Read a protocol buffer's whole number at `at`; return it and the position of its end."""
     value, shift = 0, 0
     while True:
         byte = data[at]
@@ -240,7 +244,7 @@ def _shipped_files() -> list:
 
 
 def find_network(platform: Platform, name: str | Path) -> NetworkSeed | UniversalSeed:
-    """A network by the name of one that comes with the package, or the path of a run or file.
+    """Open the network of a name that comes with the package, or of a run's or file's path.
 
     Raises:
         GoughError: there is none, or it is damaged or of another platform.
