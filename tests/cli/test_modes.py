@@ -59,9 +59,24 @@ def test_the_table_fits_80_columns(capsys, monkeypatch, name):
     assert run((), platform=name) == 0
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
-    assert lines[0].split() == [*["pose", "x", "y", "z"], "rx_deg", "ry_deg", "rz_deg", "proven",
+    assert lines[0].endswith("your machine.")
+    assert lines[1].split() == [*["pose", "x", "y", "z"], "rx_deg", "ry_deg", "rz_deg", "radius",
                                 "fails"]  # fmt: skip
     assert "\N{HORIZONTAL ELLIPSIS}" not in "".join(lines)
+
+
+def test_the_answer_comes_first(capsys):
+    legs = ("655", "655", "655", "655", "655", "660")
+    assert run(legs, platform="reference") == 0
+    said = capsys.readouterr().out
+    assert said.startswith("1 of 16 poses fits your machine.\n")
+    assert "no other pose with these readings lies within this distance" in " ".join(said.split())
+
+
+@pytest.mark.parametrize("length", ["1e20", "1e308"])
+def test_huge_readings_have_no_pose_and_no_traceback(capsys, length):
+    run((length, "1", "1", "1", "1", "1"), platform="reference")
+    assert capsys.readouterr().out.startswith("No pose was found for these readings.")
 
 
 def test_the_file_goes_to_standard_output_and_the_table_beside_it(capfdbinary):

@@ -1,4 +1,4 @@
-"""gough modes: every pose that leg readings allow, each with its proof."""
+"""gough modes: every pose that leg readings allow, each with its certificate."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def run(
     plot: Annotated[str | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     workers: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
 ) -> int:
-    """Every pose that leg readings allow, each with its proof.
+    """Find every pose that leg readings allow, and certify each.
 
     gough modes -p dietmaier
 
@@ -62,7 +62,7 @@ def run(
 
 
 def _painter(path: str) -> Callable[[AssemblyModes], None]:
-    """What draws modes; whatever is wrong with the name is said before any work is done."""
+    """A function that draws modes; an unusable file name is refused before any work is done."""
     from gough.plot.modes import modes_figure
     from gough.plot.style import check_picture, save
 
@@ -107,11 +107,14 @@ def six_numbers(name: str, values: tuple[str, ...], expected: str) -> Array:
 
 
 def _print(modes: AssemblyModes, choice: Choice, screen: Any) -> None:
-    """A table for each of the first sets of readings, and what is known about all."""
+    """Print a sentence, a table and what is known for each of the first sets of readings."""
     import numpy as np
 
-    sets = 1 if modes.legs.ndim == 1 else len(modes.legs)
+    batch = modes.legs.ndim > 1
+    sets = len(modes.legs) if batch else 1
     for k in range(min(sets, ROWS_PRINTED)):
+        number = f"Row {k + 1}: " if batch else ""
+        screen.print(number + _verdict(modes, choice, k), markup=False)
         if np.any(modes.row == k):
             screen.print(_table(modes, choice, k))
         screen.print(_summary(modes, choice, k), markup=False)
@@ -120,13 +123,22 @@ def _print(modes: AssemblyModes, choice: Choice, screen: Any) -> None:
         screen.print(f"{sets} sets of readings, {found} poses; {whole} lists are complete.")
 
 
+def _verdict(modes: AssemblyModes, choice: Choice, k: int) -> str:
+    """The answer for one set of readings in a sentence."""
+    found, fit = int(modes.counts.flat[k]), int(choice.count.flat[k])
+    if not found:
+        return "No pose was found for these readings."
+    poses = f"{found} poses" if found > 1 else "the only pose"
+    return f"{fit} of {poses} fit{'s' if fit == 1 else ''} your machine."
+
+
 def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
     """The poses of one set, in 80 columns: five digits of a length; a file holds all."""
     import numpy as np
 
     from gough.commands.show import plain_table
 
-    heads = [">pose", ">x", ">y", ">z", ">rx_deg", ">ry_deg", ">rz_deg", ">proven"]
+    heads = [">pose", ">x", ">y", ">z", ">rx_deg", ">ry_deg", ">rz_deg", ">radius"]
     table = plain_table(*heads, "fails")
     table.padding = 0
     table.columns[-1].no_wrap = False
@@ -136,7 +148,7 @@ def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
     mine = np.flatnonzero(modes.row == k)
     for i in mine[np.argsort(choice.rank[mine])]:
         fails = [name for name, passed in choice.passes.items() if not passed[i]]
-        proof = f"{certificate.radius[i]:.1g}" if certificate.certified[i] else "no"
+        proof = f"{certificate.radius[i]:.1g}" if certificate.certified[i] else "none"
         table.add_row(
             str(choice.rank[i] + 1),
             *(f"{v:z.{places}f}" for v in modes.pose.position[i]),
@@ -148,6 +160,7 @@ def _table(modes: AssemblyModes, choice: Choice, k: int) -> Any:
 
 
 def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
+    """Status of one set of readings, counts of its solutions and the meaning of the table."""
     import numpy as np
 
     from gough.status import ModesStatus
@@ -156,21 +169,19 @@ def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
     mine = modes.row == k
     status = ModesStatus(int(np.ravel(modes.status)[k]))
     unit = f" {modes.platform.unit}" if modes.platform.unit else ""
-    passed = int(np.ravel(choice.count)[k])
-    lines = [
-        f"{modes.platform.name}, {status.label}: {mine.sum()} real poses, "
-        f"{int(modes.certified[mine].sum())} certified; of this machine's {modes.solutions} "
-        f"complex solutions {real} are real, {other} complex, {away} at infinity, {meet} in "
-        "multiple ones.",
-        status.text,
-    ]
+    lines = [f"{modes.platform.name}, {status.label}: {status.text}"]
+    if real + other + away + meet:
+        lines.append(
+            f"{mine.sum()} real poses, {int(modes.certified[mine].sum())} certified; of this "
+            f"machine's {modes.solutions} complex solutions {real} are real, {other} complex, "
+            f"{away} at infinity, {meet} in multiple ones."
+        )
     if np.any(mine):
         lines += [
-            f"{passed} of them pass{'es' if passed == 1 else ''} every filter "
-            f"({', '.join(choice.passes)}).",
-            "Proven: no other pose with these readings is within so much of the pose"
-            + (f" [{modes.platform.unit}]" if unit else "")
-            + f". Largest residual: {modes.residual[mine].max():.1e}{unit}.",
+            f"A pose fits if it passes every filter: {', '.join(choice.passes)}.",
+            f"Uniqueness radius{unit and f' [{unit[1:]}]'}: no other pose with these readings lies "
+            "within this distance.",
+            f"Largest residual: {modes.residual[mine].max():.1e}{unit}.",
         ]
     return "\n".join(lines)
 
