@@ -105,7 +105,7 @@ def certify(platform: Platform, legs: ArrayLike | Table, pose: Pose) -> Certific
         >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> gough.certify(platform, platform.home_legs, platform.home)
-        Certificate(1 of 1 certified; smallest radius 4.06 [mm])
+        Certificate(1 of 1 certified; smallest radius 4.46 [mm])
     """
     base, lengths = equivalent_struts(platform, legs)
     shape = np.broadcast_shapes(lengths.shape[:-1], pose.batch)

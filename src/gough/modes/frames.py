@@ -30,6 +30,9 @@ from gough.pose import Pose
 _U = np.array([0.52, 0.37, -0.61, 0.47])
 _V = np.array([-0.41, 0.66, 0.35, 0.52])
 _U, _V = _U / np.linalg.norm(_U), _V / np.linalg.norm(_V)
+_RU, _RV = quaternion.to_matrix(_U), quaternion.to_matrix(_V)
+# a row (w, x, y, z) of the platform's times this matrix is the product U wxyz conj(V)
+_TURN = quaternion.product(quaternion.product(_U, np.eye(4)), quaternion.conjugate(_V))
 FLAT = 1e-12  # joints within this share of their spread from a plane lie in it
 
 
@@ -42,8 +45,9 @@ class Frames:
         base_centre, moving_centre: (3,) origins [platform unit].
         pivot: (3,) the platform's pivot [platform unit].
         moving: (6, 3) normalised platform joints.
-        mirror: two unit quaternions (n, m) if base and platform joints are planar: (t, e) and
-            its mirror image (t - 2 (n.t) n, n e m), a quaternion product, have the same legs.
+        mirror: matrices (3, 3) and (4, 4) if base and platform joints are planar, with unit
+            normals n and m: (t, e) and its mirror image (t - 2 (n.t) n, n e m), a quaternion
+            product, have the same legs, and are rows times these matrices.
     """
 
     scale: float
@@ -63,14 +67,15 @@ class Frames:
         n, m = _normal(base), _normal(moving)
         mirror = None
         if platform.rotary is None and n is not None and m is not None:
-            n, m = quaternion.to_matrix(_U) @ n, quaternion.to_matrix(_V) @ m
-            mirror = np.append(0.0, n), np.append(0.0, m)
-        rotated = (moving - moving_centre) @ quaternion.to_matrix(_V).T / scale
+            n, m = np.append(0.0, _RU @ n), np.append(0.0, _RV @ m)
+            flip = quaternion.product(quaternion.product(n, np.eye(4)), m)
+            mirror = np.eye(3) - 2 * np.outer(n[1:], n[1:]), flip
+        rotated = (moving - moving_centre) @ _RV.T / scale
         return cls(scale, base_centre, moving_centre, platform.pivot_point, rotated, mirror)
 
     def base(self, base: Array) -> Array:
         """Normalised base joints (..., 6, 3)."""
-        return (base - self.base_centre) @ quaternion.to_matrix(_U).T / self.scale
+        return (base - self.base_centre) @ _RU.T / self.scale
 
     def squares(self, lengths: Array) -> Array:
         """Normalised squared lengths (..., 6)."""
@@ -78,27 +83,23 @@ class Frames:
 
     def denormalise(self, poses: Array) -> Pose:
         """The platform's poses that normalised real ones (..., 7) stand for."""
-        t, e = poses[..., :3], poses[..., 3:]
-        wxyz = quaternion.product(quaternion.product(quaternion.conjugate(_U), e), _V)
+        wxyz = poses[..., 3:] @ _TURN.T
         wxyz = wxyz / np.linalg.norm(wxyz, axis=-1, keepdims=True)
         arm = quaternion.to_matrix(wxyz) @ (self.moving_centre - self.pivot)
-        there = self.scale * t @ quaternion.to_matrix(_U) + self.base_centre
+        there = self.scale * poses[..., :3] @ _RU + self.base_centre
         return Pose(there - arm - self.pivot, np.where(wxyz[..., :1] < 0, -wxyz, wxyz))
 
     def normalise(self, pose: Pose) -> Array:
         """Normalised poses (..., 7) of the platform's."""
-        e = quaternion.product(quaternion.product(_U, pose.wxyz), quaternion.conjugate(_V))
         arm = pose.rotation @ (self.moving_centre - self.pivot)
         there = pose.position + self.pivot + arm - self.base_centre
-        return np.concatenate([there @ quaternion.to_matrix(_U).T / self.scale, e], axis=-1)
+        return np.concatenate([there @ _RU.T / self.scale, pose.wxyz @ _TURN], axis=-1)
 
     def reflect(self, poses: NDArray) -> NDArray:
         """Mirror images of normalised poses (..., 7), real or complex, of a planar platform."""
         assert self.mirror is not None
-        n, m = self.mirror
-        t, e = poses[..., :3], poses[..., 3:]
-        flipped = quaternion.product(quaternion.product(n, e), m)
-        return np.concatenate([t - 2 * (t @ n[1:])[..., None] * n[1:], flipped], axis=-1)
+        reflection, flip = self.mirror
+        return np.concatenate([poses[..., :3] @ reflection, poses[..., 3:] @ flip], axis=-1)
 
 
 def _normal(joints: Array) -> Array | None:

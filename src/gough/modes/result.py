@@ -54,7 +54,7 @@ class AssemblyModes:
         >>> platform = gough.Platform.load("reference")
         >>> modes = gough.assembly_modes(platform, [platform.home_legs, platform.home_legs + 1])
         >>> modes.counts, modes[0].complete
-        (array([16, 16]), True)
+        (array([16, 16]), array(True))
     """
 
     platform: Platform
