@@ -98,8 +98,8 @@ def _print(platform: Platform, rows: Sequence[Row]) -> None:
         )  # fmt: skip
     screen.print(errors)
     screen.print(
-        "\nNewton's method from them without a second try: true pose, another pose (twins: in the\n"
-        "workspace, too), no convergence. solve: rows that gough.solve does not end at the true\n"
+        "\nNewton's method from them without a second try: true pose, another pose (twins: also in "
+        "the workspace), no convergence. solve: rows that gough.solve does not end at the true "
         "pose. ms/1000: time of 1,000 guesses in one call.",
         markup=False,
     )  # fmt: skip

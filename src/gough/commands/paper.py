@@ -44,14 +44,14 @@ def run(
 
     gough paper -o FOLDER --stage sets
 
-    In full it trains 24 networks, five minutes each on one thread.
+    In full it trains 28 networks, five minutes each on one thread.
 
     The folder gets index.md, report.html, figures, results and networks.
 
     Args:
         networks: Take the networks from this folder instead of the study's own; each must have the
             sum that networks.json states.
-        quick: Run everything at small scale, in about two minutes.
+        quick: Run everything at small scale, in about three minutes.
         budget: Train each network for this processor time, such as 5m; else 5m, or 1s if --quick.
         stage: Run only this part; may be repeated: train, then networks, sets, methods, iterations,
             wide, curves, times, poses, errors, then report.
