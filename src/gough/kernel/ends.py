@@ -163,16 +163,15 @@ def _same_end(a, b):
     """True if two complex poses agree to SAME of their size."""
     size = 1.0
     for k in range(3):
-        if abs(a[k]) > size:
-            size = abs(a[k])
+        size = max(size, _square(a[k]))
     for k in range(3):
-        if abs(a[k] - b[k]) > SAME * size:
+        if _square(a[k] - b[k]) > SAME * SAME * size:
             return False
     aa, bb, ab = 0j, 0j, 0j
     for k in range(3, 7):
         aa, bb, ab = aa + a[k] * a[k], bb + b[k] * b[k], ab + a[k] * b[k]
     # for quaternions a = +-b with a.a = b.b = 1, a.b = +-1
-    return abs(ab * ab / (aa * bb) - 1.0) < SAME
+    return _square(ab * ab - aa * bb) < SAME * SAME * _square(aa * bb)
 
 
 @inner
@@ -180,7 +179,12 @@ def _is_beyond(end, squares):
     """True if a position is far beyond any real pose's: a leg and the joints' distances from 0."""
     longest = 0.0
     for i in range(6):
-        if squares[i] > longest:
-            longest = squares[i]
-    limit = FAR * (2.0 + np.sqrt(longest))
-    return abs(end[0]) > limit or abs(end[1]) > limit or abs(end[2]) > limit
+        longest = max(longest, squares[i])
+    limit = (FAR * (2.0 + np.sqrt(longest))) ** 2
+    return _square(end[0]) > limit or _square(end[1]) > limit or _square(end[2]) > limit
+
+
+@inner
+def _square(number):
+    """Square of the magnitude of a complex number."""
+    return number.real * number.real + number.imag * number.imag
