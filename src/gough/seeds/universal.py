@@ -22,7 +22,7 @@ from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.seeds.damped import polish
+from gough.seeds.damped import Polished, polish
 from gough.seeds.network import NETWORK, read, read_facts, session
 from gough.seeds.taylor import HomeStruts, cross, gibbs_quaternion, series
 
@@ -53,6 +53,7 @@ class UniversalSeed:
     Args:
         path: a run's folder or its .onnx file; none: the one that comes with gough.
         threads: CPU threads for evaluation; 0: as many as there are cores.
+        polished: take the damped Newton steps; without them the guess is the network's own answer.
 
     Raises:
         GoughError: no such file, a damaged one, or one fine-tuned for another platform.
@@ -60,9 +61,10 @@ class UniversalSeed:
 
     name = KIND
 
-    def __init__(self, platform: Platform, path: str | Path | None = None, *, threads: int = 0
+    def __init__(self, platform: Platform, path: str | Path | None = None, *, threads: int = 0,
+                 polished: bool = True
                  ) -> None:  # fmt: skip
-        self.platform = platform
+        self.platform, self._polished = platform, polished
         self._session, self.facts = _open(platform, path, threads)
 
     def guess(self, legs: Array) -> Pose:
@@ -88,7 +90,8 @@ class UniversalSeed:
         with np.errstate(all="ignore"):  # readings far from any pose overflow, and end at home
             home = HomeStruts.of(self.platform, legs)
             x = np.swapaxes(home.inverse @ self._corrected(home), 0, 1)
-            found = polish(home, x[:3], gibbs_quaternion(x[3:]))
+            t, wxyz = x[:3], gibbs_quaternion(x[3:])
+            found = polish(home, t, wxyz) if self._polished else Polished(t, wxyz, np.zeros_like(x))
             arm = home.arm(self.platform, found.wxyz)
             away = found.step[:3] + cross(found.step[3:], arm)
             errors = [np.sqrt(np.sum(e * e, axis=0)).ravel() for e in (away, found.step[3:])]

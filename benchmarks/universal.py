@@ -1,0 +1,236 @@
+"""The universal network beside what needs no training, on machines that it has never seen.
+
+python benchmarks/universal.py                 # every table; about ten minutes
+python benchmarks/universal.py wide speed      # some of them
+
+Errors are mean translation errors as shares of the machine's size, over poses with home's sign of
+det J, drawn evenly from boxes about home with a fixed seed. `network` is the network's answer
+alone, `universal` the seed: the network and its damped Newton steps.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import gough
+from gough.seeds.damped import polish
+from gough.seeds.taylor import HomeStruts, TaylorSeed, gibbs_quaternion, series
+from gough.seeds.universal import UniversalSeed
+
+POSES, NEWTON_POSES = 3000, 300
+NARROW = {
+    "reference": (0.08, 30), "nasa_msfc": (0.08, 30), "matlab_stewart": (0.08, 30),
+    "linuxcnc_genhex": (0.08, 30), "reachy_mini": (0.08, 30), "dietmaier": (0.04, 15),
+    "rubin_camera": (0.05, 6), "rubin_simulink": (0.05, 6),
+}  # fmt: skip
+# where +-15 % and +-60 deg leave less than half of the poses, or a pivot far away moves the joints
+# by the machine's size, a smaller box
+WIDE = dict.fromkeys(NARROW, (0.15, 60)) | {
+    "dietmaier": (0.08, 30), "rubin_camera": (0.08, 15), "rubin_simulink": (0.08, 15)
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """A machine with a box as its workspace, poses of it and their readings."""
+
+    platform: gough.Platform
+    pose: gough.Pose
+    legs: np.ndarray
+
+    @classmethod
+    def of(cls, platform: gough.Platform, box: tuple[float, float], count: int) -> Case:
+        platform = platform.with_workspace(box[0] * platform.size, box[1])
+        pose = platform.sample_poses(count, seed=77)
+        legs = gough.leg_lengths(platform, pose)
+        good = np.isfinite(legs).all(-1) & (gough.assembly_sign(platform, pose) > 0)
+        return cls(platform, pose[good], legs[good])
+
+    def errors(self, guess: gough.Pose) -> np.ndarray:
+        return guess.distance(self.pose)[0] / self.platform.size
+
+    def missed(self, guess: gough.Pose) -> str:
+        """How often plain Newton from a guess does not end at the true pose."""
+        from gough.learn.metrics import count_newton_ends
+
+        ends = count_newton_ends(self.platform, guess, self.pose, self.legs)
+        return f"{ends.count - ends.true:,}"
+
+
+class Network:
+    """The network's answer alone, without the damped steps."""
+
+    def __init__(self, platform: gough.Platform) -> None:
+        self.seed = UniversalSeed(platform, polished=False)
+
+    def guess(self, legs: np.ndarray) -> gough.Pose:
+        return self.seed.guess(legs)
+
+
+class Closed:
+    """A Taylor series and damped steps: what costs less than the network."""
+
+    def __init__(self, platform: gough.Platform, order: int) -> None:
+        self.platform, self.order = platform, order
+
+    def guess(self, legs: np.ndarray) -> gough.Pose:
+        with np.errstate(all="ignore"):
+            home = HomeStruts.of(self.platform, legs)
+            terms = series(home.base, home.joints, home.inverse, home.change, self.order)
+            x = np.swapaxes(home.inverse @ sum(terms), 0, 1)
+            found = polish(home, x[:3], gibbs_quaternion(x[3:]))
+        return home.pose(self.platform, found.t, found.wxyz)
+
+
+def seeds(platform: gough.Platform) -> dict[str, Any]:
+    """What is compared: names and objects with `guess(legs)`."""
+    return {
+        "home": gough.PolynomialSeed(platform, 0),
+        "taylor-2": TaylorSeed(platform, 2),
+        "taylor-2 + steps": Closed(platform, 2),
+        "polynomial-3, fitted": gough.PolynomialSeed(platform, 3),
+        "network": Network(platform),
+        "universal": UniversalSeed(platform),
+    }
+
+
+def accuracy() -> None:
+    """Mean and worst error, share of the size in %, over a box that the machine is used in."""
+    _table(NARROW, POSES, lambda case, guess: _mean_and_worst(case.errors(guess)))
+
+
+def newton() -> None:
+    """How many of 100,000 poses plain Newton misses from each guess, over the same boxes."""
+    _table(NARROW, NEWTON_POSES, Case.missed)
+
+
+def wide() -> None:
+    """The same over wide boxes: mean and worst error in %, and what plain Newton misses."""
+    both = lambda case, guess: f"{_mean_and_worst(case.errors(guess))}; {case.missed(guess)}"  # noqa: E731
+    _table(WIDE, POSES, both)
+
+
+def _table(boxes: dict, count: int, cell: Callable[[Case, gough.Pose], str]) -> None:
+    heads = list(seeds(gough.Platform.load("reference").with_workspace(1.0, 1.0)))
+    print("| machine | box | poses | " + " | ".join(heads) + " |")
+    print("|---|---|---:|" + "---:|" * len(heads))
+    for name, box in boxes.items():
+        case = Case.of(gough.Platform.load(name), box, count)
+        cells = [cell(case, seed.guess(case.legs)) for seed in seeds(case.platform).values()]
+        print(f"| {name} | ±{100 * box[0]:g} %, ±{box[1]}° | {len(case.pose):,} | "
+              f"{' | '.join(cells)} |", flush=True)  # fmt: skip
+    print()
+
+
+def _mean_and_worst(errors: np.ndarray) -> str:
+    return f"{100 * errors.mean():.2g} ({100 * errors.max():.2g})"
+
+
+def random_machines(count: int = 500, odd: float = 0.0, rows: int = 60) -> list[Case]:
+    """Random machines of a seed that no training has, over +-8 % and +-30 deg."""
+    from gough.learn.universal.machines import Draw
+
+    machines = Draw(10**9 + int(10 * odd)).machines(count, odd)
+    made = [
+        gough.Platform(b.numpy(), j.numpy(), home=np.zeros(3))
+        for b, j in zip(machines.base, machines.joints, strict=True)
+    ]
+    return [Case.of(platform, (0.08, 30), rows) for platform in made]
+
+
+def random() -> None:
+    """500 random machines of the usual kinds, and 200 with joints anywhere in a box."""
+    print("| machines | guess | median of their mean errors, % | 90 % of them below | worst |")
+    print("|---|---|---:|---:|---:|")
+    for label, cases in (
+        ("500 usual ones", random_machines()),
+        ("200 with joints anywhere", random_machines(200, 1.0)),
+    ):
+        for name, make in (
+            ("taylor-2", lambda p: TaylorSeed(p, 2)), ("network", Network),
+            ("taylor-2 + steps", lambda p: Closed(p, 2)), ("universal", UniversalSeed),
+        ):  # fmt: skip
+            means = np.array([c.errors(make(c.platform).guess(c.legs)).mean() for c in cases])
+            print(f"| {label} | {name} | {100 * np.median(means):.2g} | "
+                  f"{100 * np.quantile(means, 0.9):.2g} | {100 * means.max():.2g} |")  # fmt: skip
+    print()
+
+
+def predicted() -> None:
+    """How often the error is below three times its prediction, and how sharp that is."""
+    print("| machines | below 3 x the prediction, % | prediction / error, median |")
+    print("|---|---:|---:|")
+    groups = {f"{n}, ±{100 * b[0]:g} %, ±{b[1]}°": [Case.of(gough.Platform.load(n), b, POSES)]
+              for boxes in (NARROW, WIDE) for n, b in boxes.items()}  # fmt: skip
+    groups |= {"500 usual random ones": random_machines()}
+    groups |= {"200 with joints anywhere": random_machines(200, 1.0)}
+    for label, cases in groups.items():
+        ratio = np.concatenate([_ratio(case) for case in cases])
+        print(f"| {label} | {100 * np.mean(ratio < 3):.2f} | {1 / np.median(ratio):.2f} |",
+              flush=True)  # fmt: skip
+    print()
+
+
+def _ratio(case: Case) -> np.ndarray:
+    guess = UniversalSeed(case.platform).guess_with_error(case.legs)
+    return guess.pose.distance(case.pose)[0] / guess.position_error
+
+
+def speed() -> None:
+    """Milliseconds for 1,000 guesses in one call: the least of 30, on all cores of this machine."""
+    print("| guess | reference, ms | reachy_mini (rotary), ms |")
+    print("|---|---:|---:|")
+    cases = [
+        Case.of(gough.Platform.load(n), (0.06, 20), 1100) for n in ("reference", "reachy_mini")
+    ]
+    for name in seeds(cases[0].platform):
+        times = [_time(seeds(c.platform)[name].guess, c.legs[:1000]) for c in cases]
+        print(f"| {name} | {times[0]:.2f} | {times[1]:.2f} |", flush=True)
+    facts = UniversalSeed(cases[0].platform).facts
+    record = facts["record"]
+    print(f"\nnumbers: {facts['parameters']:,}; trained for {record['seconds']:,.0f} s on one core, "
+          f"{record['steps']:,} steps, {record['samples']:,} poses\n")  # fmt: skip
+
+
+def _time(guess: Callable, legs: np.ndarray, repeats: int = 30) -> float:
+    guess(legs)
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        guess(legs)
+        times.append(time.perf_counter() - began)
+    return 1e3 * min(times)
+
+
+def auto() -> None:
+    """Whole solves without a stated workspace, from home and from the network: rows not true."""
+    print("| machine | box | from home: not true, s | from universal: not true, s |")
+    print("|---|---|---:|---:|")
+    for boxes in (NARROW, WIDE):
+        for name, box in boxes.items():
+            case = Case.of(gough.Platform.load(name), box, POSES)
+            plain = replace(gough.Platform.load(name), workspace=None)
+            cells = []
+            for seed in ("home", "universal"):
+                gough.solve(plain, case.legs[:2], seed=seed)
+                began = time.perf_counter()
+                solved = gough.solve(plain, case.legs, seed=seed)
+                took = time.perf_counter() - began
+                wrong = np.sum(case.errors(solved.pose) > 1e-6)
+                cells.append(f"{wrong:,}, {took:.2f}")
+            print(f"| {name} | ±{100 * box[0]:g} %, ±{box[1]}° | {' | '.join(cells)} |", flush=True)
+    print()
+
+
+TABLES = {f.__name__: f for f in (accuracy, random, newton, wide, predicted, speed, auto)}
+
+if __name__ == "__main__":
+    for chosen in sys.argv[1:] or TABLES:
+        print(f"## {chosen}\n\n{TABLES[chosen].__doc__}\n")
+        TABLES[chosen]()
