@@ -10,10 +10,12 @@ alone, `universal` the seed: the network and its damped Newton steps.
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from gough.seeds.damped import polish
 from gough.seeds.taylor import HomeStruts, TaylorSeed, gibbs_quaternion, series
 from gough.seeds.universal import UniversalSeed
 
-POSES, NEWTON_POSES = 3000, 300
+POSES, NEWTON_POSES = 20_000, 100_000
 NARROW = {
     "reference": (0.08, 30), "nasa_msfc": (0.08, 30), "matlab_stewart": (0.08, 30),
     "linuxcnc_genhex": (0.08, 30), "reachy_mini": (0.08, 30), "dietmaier": (0.04, 15),
@@ -194,7 +196,7 @@ def speed() -> None:
         print(f"| {name} | {times[0]:.2f} | {times[1]:.2f} |", flush=True)
     facts = UniversalSeed(cases[0].platform).facts
     record = facts["record"]
-    print(f"\nnumbers: {facts['parameters']:,}; trained for {record['seconds']:,.0f} s on one core, "
+    print(f"\nnumbers: {facts['parameters']:,}; trained {record['seconds']:,.0f} s on one core, "
           f"{record['steps']:,} steps, {record['samples']:,} poses\n")  # fmt: skip
 
 
@@ -228,7 +230,44 @@ def auto() -> None:
     print()
 
 
-TABLES = {f.__name__: f for f in (accuracy, random, newton, wide, predicted, speed, auto)}
+def distance() -> None:
+    """Mean error of each machine against its distance from the training set, for the figure.
+
+    The distance of two machines is the root mean square difference of their sorted distances
+    between base joints, between platform joints, and from one to the other [share of the size];
+    that from the training set is to the nearest of 20,000 machines drawn as for training.
+    """
+    from gough.learn.universal.machines import Draw
+
+    drawn = Draw(0).machines(20_000)
+    known = _signature(drawn.base.numpy(), drawn.joints.numpy())
+    catalog = [Case.of(gough.Platform.load(n), box, 2000) for n, box in NARROW.items()]
+    groups = {"usual": random_machines(250), "anywhere": random_machines(150, 1.0)}
+    out: dict[str, Any] = {}
+    for label, cases in (groups | {"catalog": catalog}).items():
+        rows = []
+        for case in cases:
+            p = case.platform
+            joints = p.home.apply(p.moving - p.pivot_point) + p.pivot_point
+            mine = _signature(p.base[None] / p.size, joints[None] / p.size)
+            nearest = float(np.sqrt(np.mean((known - mine) ** 2, axis=1)).min())
+            made = TaylorSeed(p, 2), Network(p), UniversalSeed(p)
+            errors = [float(case.errors(seed.guess(case.legs)).mean()) for seed in made]
+            rows.append([float(f"{v:.4g}") for v in (nearest, *errors)])
+        out[label] = rows
+    out["names"] = list(NARROW)
+    text = json.dumps(out) + "\n"
+    Path("docs/figures/universal.json").write_text(text)
+    print(f"docs/figures/universal.json: {sum(len(v) for v in groups.values())} machines\n")
+
+
+def _signature(base: np.ndarray, joints: np.ndarray) -> np.ndarray:
+    gaps = lambda a, b: np.linalg.norm(a[:, :, None] - b[:, None], axis=-1).reshape(len(a), -1)  # noqa: E731
+    pairs = gaps(base, base), gaps(joints, joints), gaps(base, joints)
+    return np.concatenate([np.sort(d, axis=1) for d in pairs], axis=1)
+
+
+TABLES = {f.__name__: f for f in (accuracy, random, newton, wide, predicted, speed, auto, distance)}
 
 if __name__ == "__main__":
     for chosen in sys.argv[1:] or TABLES:

@@ -9,11 +9,12 @@ import sys
 from pathlib import Path
 
 import explain
+import learned
 import measured
 import workshop
 from style import IMAGES, save
 
-FIGURES = workshop.FIGURES | explain.FIGURES | measured.FIGURES
+FIGURES = workshop.FIGURES | explain.FIGURES | measured.FIGURES | learned.FIGURES
 
 
 def draw(names: list[str], folder: Path = IMAGES) -> None:
