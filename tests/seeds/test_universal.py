@@ -193,3 +193,10 @@ def _shipped_body() -> bytes:
 
     content = resources.files("gough").joinpath("weights", "universal.onnx").read_bytes()
     return _unseal(content, "universal")
+
+
+def test_auto_takes_it_for_a_guess_alone():
+    platform = gough.Platform.load("reference")
+    assert gough.Solver(platform, max_iterations=0).seed.name == "universal"
+    assert gough.Solver(platform).seed.name == "polynomial-3"
+    assert gough.Solver(replace(platform, workspace=None)).seed.name == "home"

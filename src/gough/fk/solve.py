@@ -62,8 +62,9 @@ class Solver:
     opened, when it is made.
 
     Attributes:
-        seed: the first guess. "auto" (polynomial where the platform states a workspace, else
-            home), "home", "polynomial", "polynomial-5" (another degree), "disgnet" or another
+        seed: the first guess. "auto" (the universal network if `max_iterations` is 0, else the
+            polynomial where the platform states a workspace, else home), "home", "universal",
+            "taylor-2", "polynomial", "polynomial-5" (another degree), "disgnet" or another
             network that comes with the package, the path of a trained one or of its run's
             folder, a `Pose` (one, or one a row), or any object with `guess(legs) -> Pose`.
             Held as such an object.
@@ -112,7 +113,9 @@ class Solver:
             value = getattr(self, name)
             if not 0 <= value <= high:
                 raise GoughError(f"{name}: expected 0 to {high:g}, found {value!r}")
-        object.__setattr__(self, "seed", find_seed(self.platform, self.seed))
+        object.__setattr__(
+            self, "seed", find_seed(self.platform, self.seed, guess_only=not self.max_iterations)
+        )
 
     def __call__(
         self,

@@ -13,10 +13,11 @@ from gough.checks import Array
 from gough.errors import GoughError
 from gough.kernel import layout
 from gough.kernel.constants import kernel_constants, to_internal
+from gough.kinematics import singularity_distance
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.seeds.polynomial import DEGREE, PolynomialSeed
-from gough.seeds.taylor import TaylorSeed
+from gough.seeds.taylor import SINGULAR, TaylorSeed
 from gough.workspace import Workspace
 
 
@@ -94,8 +95,11 @@ def starting_poses(platform: Platform, seed: Seed, legs: Array) -> Start:
     return lambda rows: poses[rows]
 
 
-def find_seed(platform: Platform, seed: str | Seed | Pose) -> Seed:
+def find_seed(platform: Platform, seed: str | Seed | Pose, *, guess_only: bool = False) -> Seed:
     """Return the seed that an argument of `gough.solve` stands for.
+
+    Args:
+        guess_only: the guess is the result, so "auto" is the universal network.
 
     Raises:
         GoughError: an unknown name; the text lists those there are.
@@ -103,6 +107,8 @@ def find_seed(platform: Platform, seed: str | Seed | Pose) -> Seed:
     """
     if isinstance(seed, Pose):
         return PoseSeed(seed)
+    if seed == "auto" and guess_only and singularity_distance(platform, platform.home) > SINGULAR:
+        return _universal(platform)
     if isinstance(seed, str):
         return _named(platform, seed)
     if not callable(getattr(seed, "guess", None)):
