@@ -2,6 +2,7 @@
 
 python benchmarks/universal.py                 # every table; about ten minutes
 python benchmarks/universal.py wide speed      # some of them
+python benchmarks/universal.py tuning          # trains networks: half an hour of processor time
 
 Errors are mean translation errors as shares of the machine's size, over poses with home's sign of
 det J, drawn evenly from boxes about home with a fixed seed. `network` is the network's answer
@@ -13,7 +14,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ import numpy as np
 
 import gough
 from gough.seeds.damped import polish
+from gough.seeds.network import NetworkSeed
 from gough.seeds.taylor import HomeStruts, TaylorSeed, gibbs_quaternion, series
 from gough.seeds.universal import UniversalSeed
 
@@ -90,16 +92,18 @@ class Closed:
         return home.pose(self.platform, found.t, found.wxyz)
 
 
+NAMES = (
+    "home", "taylor-2", "taylor-2 + steps", "polynomial-3, fitted", "network", "universal"
+)  # fmt: skip
+
+
 def seeds(platform: gough.Platform) -> dict[str, Any]:
     """What is compared: names and objects with `guess(legs)`."""
-    return {
-        "home": gough.PolynomialSeed(platform, 0),
-        "taylor-2": TaylorSeed(platform, 2),
-        "taylor-2 + steps": Closed(platform, 2),
-        "polynomial-3, fitted": gough.PolynomialSeed(platform, 3),
-        "network": Network(platform),
-        "universal": UniversalSeed(platform),
-    }
+    made = (
+        gough.PolynomialSeed(platform, 0), TaylorSeed(platform, 2), Closed(platform, 2),
+        gough.PolynomialSeed(platform, 3), Network(platform), UniversalSeed(platform),
+    )  # fmt: skip
+    return dict(zip(NAMES, made, strict=True))
 
 
 def accuracy() -> None:
@@ -109,7 +113,8 @@ def accuracy() -> None:
 
 def newton() -> None:
     """How many of 100,000 poses plain Newton misses from each guess, over the same boxes."""
-    _table(NARROW, NEWTON_POSES, Case.missed)
+    names = ("home", "taylor-2", "polynomial-3, fitted", "universal")
+    _table(NARROW, NEWTON_POSES, Case.missed, names)
 
 
 def wide() -> None:
@@ -118,13 +123,14 @@ def wide() -> None:
     _table(WIDE, POSES, both)
 
 
-def _table(boxes: dict, count: int, cell: Callable[[Case, gough.Pose], str]) -> None:
-    heads = list(seeds(gough.Platform.load("reference").with_workspace(1.0, 1.0)))
+def _table(boxes: dict, count: int, cell: Callable[[Case, gough.Pose], str],
+           heads: Sequence[str] = NAMES) -> None:  # fmt: skip
     print("| machine | box | poses | " + " | ".join(heads) + " |")
     print("|---|---|---:|" + "---:|" * len(heads))
     for name, box in boxes.items():
         case = Case.of(gough.Platform.load(name), box, count)
-        cells = [cell(case, seed.guess(case.legs)) for seed in seeds(case.platform).values()]
+        ours = seeds(case.platform)
+        cells = [cell(case, ours[name].guess(case.legs)) for name in heads]
         print(f"| {name} | ±{100 * box[0]:g} %, ±{box[1]}° | {len(case.pose):,} | "
               f"{' | '.join(cells)} |", flush=True)  # fmt: skip
     print()
@@ -191,7 +197,7 @@ def speed() -> None:
     cases = [
         Case.of(gough.Platform.load(n), (0.06, 20), 1100) for n in ("reference", "reachy_mini")
     ]
-    for name in seeds(cases[0].platform):
+    for name in NAMES:
         times = [_time(seeds(c.platform)[name].guess, c.legs[:1000]) for c in cases]
         print(f"| {name} | {times[0]:.2f} | {times[1]:.2f} |", flush=True)
     facts = UniversalSeed(cases[0].platform).facts
@@ -267,9 +273,41 @@ def _signature(base: np.ndarray, joints: np.ndarray) -> np.ndarray:
     return np.concatenate([np.sort(d, axis=1) for d in pairs], axis=1)
 
 
-TABLES = {f.__name__: f for f in (accuracy, random, newton, wide, predicted, speed, auto, distance)}
+def tuning(budget: str = "60s", whole: str = "10m") -> None:
+    """`gough train --from universal` for a minute beside ResMLP from nothing for ten, one core.
+
+    Mean position error over held-out poses of the workspace, in units of the machine. Slow: half an
+    hour of processor time.
+    """
+    from gough.learn.config import PRESETS
+    from gough.learn.evaluate import held_out
+    from gough.learn.train import train
+    from gough.learn.universal.finetune import finetune
+
+    print("| machine | universal | network alone | tuned 60 s | network alone | ResMLP 10 min |")
+    print("|---|---:|---:|---:|---:|---:|")
+    for name in ("reference", "nasa_msfc", "rubin_simulink"):
+        platform, folder = gough.Platform.load(name), Path("runs/tuning") / name
+        pose, legs = held_out(platform, POSES, False)
+        finetune(platform, folder / "tuned", budget=budget)
+        config = PRESETS["default"].with_run(budget=whole, clock="processor", threads=1)
+        train(platform, config, folder / "new", show=False)
+        paths = {"universal": None, "tuned": folder / "tuned"}
+        guesses = [
+            UniversalSeed(platform, path, polished=polished)
+            for path in paths.values() for polished in (True, False)
+        ] + [NetworkSeed(platform, folder / "new")]  # fmt: skip
+        errors = [seed.guess(legs).distance(pose)[0].mean() for seed in guesses]
+        print(f"| {name} | {' | '.join(f'{e:.3g}' for e in errors)} |", flush=True)
+    print("curves: metrics.csv of each run in runs/tuning\n")
+
+
+TABLES = {
+    f.__name__: f
+    for f in (accuracy, random, newton, wide, predicted, speed, auto, distance, tuning)
+}
 
 if __name__ == "__main__":
-    for chosen in sys.argv[1:] or TABLES:
+    for chosen in sys.argv[1:] or [name for name in TABLES if name != "tuning"]:
         print(f"## {chosen}\n\n{TABLES[chosen].__doc__}\n")
         TABLES[chosen]()
