@@ -23,7 +23,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Build:
     @lru_cache
     def compiled(platform: Platform, real: RealName) -> Machine:
         folder = tmp_path_factory.mktemp("machine")
-        return build(platform, folder, real=real, flags=("-O1",))
+        return build(platform, folder, real=real, flags=("-O0",))
 
     def make(platform: Platform | str, real: RealName = "double") -> Machine:
         machine = Platform.load(platform) if isinstance(platform, str) else platform
