@@ -1,5 +1,9 @@
 # The public names, once: type checkers read this file, and so does `__init__.py` when it runs.
 
+from .calibration.fit import calibrate as calibrate
+from .calibration.plan import Plan as Plan
+from .calibration.plan import plan_poses as plan_poses
+from .calibration.result import Calibration as Calibration
 from .certificate import Certificate as Certificate
 from .certificate import certify as certify
 from .errors import GoughError as GoughError

@@ -12,6 +12,8 @@ COMMANDS = {
     "solve": ("gough.commands.solve", "run", "Poses from a file of leg readings."),
     "inverse": ("gough.commands.inverse", "run", "Leg readings from a file of poses."),
     "modes": ("gough.commands.modes", "run", "Every pose that has given leg readings, proven."),
+    "plan-poses": ("gough.commands.plan_poses", "run", "The poses to measure for a calibration."),
+    "calibrate": ("gough.commands.calibrate", "run", "The machine as it is, from measured poses."),
     "plot": ("gough.commands.plot", "FIGURES", "Figures of poses, modes, workspaces and files."),
     "view": ("gough.commands.view", "run", "A machine in the browser, to look at and to move."),
     "platforms": (

@@ -1,0 +1,103 @@
+"""Which combinations of the parameters an instrument can find, and the rest in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gough.calibration.arrays import Array
+from gough.calibration.estimate import Problem, State
+from gough.calibration.parameters import Parameters
+from gough.calibration.prediction import Workspace, workspace_readings
+from gough.calibration.sensors import Sensor
+
+ZERO = 1e-10  # of the largest singular value: below it a combination is not seen at all
+
+WORDS = {
+    "pose": "",
+    "targets": "",
+    "distances": "",
+    "position": (
+        "One target does not show how the tool is rotated about it: 3 directions, which move the "
+        "platform joints about the target, stay as drawn."
+    ),
+    "one distance": (
+        "One distance does not show rotations about its station and about its target: 6 "
+        "directions, which move all base joints or all platform joints, stay as drawn."
+    ),
+    "inclinometer": (
+        "An inclinometer shows neither position nor heading: 7 directions (translations of all "
+        "base or all platform joints, the rotation about the vertical, the scale) stay as drawn."
+    ),
+}
+
+
+def rank(parameters: Parameters, sensor: Sensor, place: object) -> int:
+    """How many of the 6 K combinations the instrument fixes, were its placement known.
+
+    From many poses spread over the workspace: what more poses of the same kind could show.
+    """
+    legs, near = workspace_readings(parameters.drawing, 200)
+    problem = Problem(parameters, sensor, legs, 1.0)
+    state = State(parameters.values(parameters.drawing), place, near)
+    workspace = Workspace.__new__(Workspace)
+    workspace.problem, workspace.legs, workspace.near = problem, legs, near
+    G = workspace.derivatives(state)[0][..., : parameters.drawn.size]
+    size = parameters.drawing.size
+    units = np.ones(G.shape[1])
+    if sensor.kind == "pose":
+        units[3:] = size
+    return numerical_rank((G * units[:, None]).reshape(-1, G.shape[-1]))
+
+
+def numerical_rank(A: Array) -> int:
+    """Rank of a matrix whose columns have different units."""
+    scale = np.linalg.norm(A, axis=0)
+    scale[scale == 0] = 1
+    values = np.linalg.svd(A / scale, compute_uv=False)
+    return int(np.sum(values > ZERO * values[0])) if values[0] > 0 else 0
+
+
+def in_words(sensor: Sensor, numbers: int) -> str:
+    """What an instrument cannot see by its nature, a sentence, or nothing."""
+    kind = "one distance" if sensor.kind == "distances" and numbers == 1 else sensor.kind
+    return WORDS[kind]
+
+
+def needed_poses(parameters: Parameters, rank: int, numbers: int) -> int:
+    """Fewest poses with which the data fix all that the instrument can show."""
+    return -(-rank // numbers) + 1
+
+
+def weakest(parameters: Parameters, information: Array, count: int = 3) -> list[tuple[float, str]]:
+    """The combinations that the data say least about.
+
+    Args:
+        information: (P, P) of the data alone.
+
+    Returns:
+        For each its standard deviation after as a share of that before (1: nothing learned), and
+        the parameters it is made of, in words.
+    """
+    size = parameters.drawn.size
+    tolerance = parameters.tolerance.ravel()
+    matrix = information[:size, :size]
+    if len(information) > size:  # the placement is not known: its share is taken out
+        cross, own = information[:size, size:], information[size:, size:]
+        matrix = matrix - cross @ np.linalg.pinv(own, hermitian=True) @ cross.T
+    scaled = matrix * np.outer(tolerance, tolerance)
+    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+    shares = 1 / np.sqrt(1 + np.maximum(values, 0))
+    return [(float(shares[i]), _words(parameters, vectors[:, i])) for i in range(count)]
+
+
+def _words(parameters: Parameters, vector: Array) -> str:
+    """The largest parts of a combination."""
+    order = np.argsort(-np.abs(vector))[:4]
+    names = [
+        f"{'-' if vector[i] * vector[order[0]] < 0 else '+'} leg {i // parameters.count + 1} "
+        f"{parameters.names[i % parameters.count]}"
+        for i in order
+    ]
+    share = np.sum(vector[order] ** 2)
+    more = f", and others ({100 * (1 - share):.0f} %)" if share < 0.95 else ""
+    return " ".join(names).removeprefix("+ ") + more

@@ -1,0 +1,108 @@
+"""Files of measurements: readings and what an instrument measured, a row for each pose."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gough.checks import Array
+from gough.columns import LEGS, POSITION, checked, leg_columns, pose_columns
+from gough.errors import GoughError, InputError
+from gough.files import Reading, open_source
+from gough.platform import Platform
+from gough.pose import poses_from_columns
+
+TILTS = ("tilt_x", "tilt_y")
+COLUMNS = {
+    "pose": "x, y, z and a rotation (qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg)",
+    "position": "x, y, z",
+    "targets": "x_1, y_1, z_1, x_2, y_2, z_2, ...",
+    "distances": "distance_1, distance_2, ...",
+    "inclinometer": "tilt_x_deg, tilt_y_deg, or tilt_x, tilt_y [rad]",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The rows of a file.
+
+    Attributes:
+        legs: (n, 6) readings.
+        measured: as `gough.calibrate` takes it.
+        time: (n,) the time column, or None.
+        place: where row i stands in the file, such as "line 17".
+    """
+
+    legs: Array
+    measured: Any
+    time: Array | None
+    place: Callable[[int], str]
+
+
+def read_measured(
+    path: str, platform: Platform, kind: str = "pose", time: str | None = None
+) -> Measured:
+    """Read a .csv or .parquet file of measurements.
+
+    Args:
+        kind: what was measured, which says what columns there are; see `COLUMNS`.
+        time: name of the column of time.
+
+    Raises:
+        GoughError: a kind that is not known.
+        InputError: columns that are missing, values that are no numbers.
+    """
+    if kind not in COLUMNS:
+        raise GoughError(f"measured: expected one of {', '.join(COLUMNS)}; found {kind!r}")
+    with closing(open_source(path, platform)) as source:
+        found = source.columns
+        legs = leg_columns(source.where, found)
+        names = _columns(source.where, kind, found)
+        extra = () if time is None else checked(source.where, found, [time])
+        blocks = list(source.blocks([*legs, *names, *extra], rows=Reading().block_rows))
+    values = np.concatenate([block.numbers([*LEGS, *names, *extra]) for block in blocks])
+    starts = np.cumsum([0, *(len(block) for block in blocks)])
+
+    def place(row: int) -> str:
+        block = int(np.searchsorted(starts, row, side="right")) - 1
+        return blocks[block].place(row - int(starts[block]))
+
+    count = 6 + len(names)
+    when = values[:, count] if time is not None else None
+    return Measured(values[:, :6], _as_measured(kind, values[:, 6:count], names), when, place)
+
+
+def _columns(where: str, kind: str, found: Sequence[str]) -> tuple[str, ...]:
+    if kind == "pose":
+        return pose_columns(where, found)
+    if kind == "position":
+        return checked(where, found, POSITION)
+    if kind == "inclinometer":
+        degrees = tuple(f"{name}_deg" for name in TILTS)
+        return checked(where, found, TILTS if all(t in found for t in TILTS) else degrees)
+    stem = "x" if kind == "targets" else "distance"
+    numbers = sorted(
+        int(match[1]) for name in found if (match := re.fullmatch(rf"{stem}_(\d+)", name))
+    )
+    if not numbers or numbers != list(range(1, len(numbers) + 1)):
+        raise InputError(
+            f"{where}: no whole set of columns for {kind}; expected {COLUMNS[kind]}; found "
+            f"{', '.join(found[:12])}"
+        )
+    stems = ("x", "y", "z") if kind == "targets" else ("distance",)
+    return checked(where, found, [f"{s}_{i}" for i in numbers for s in stems])
+
+
+def _as_measured(kind: str, values: Array, names: tuple[str, ...]) -> Any:
+    if kind == "pose":
+        return poses_from_columns(values, names)[0]
+    if kind == "targets":
+        return values.reshape(len(values), -1, 3)
+    if kind == "inclinometer" and names[0].endswith("_deg"):
+        return np.radians(values)
+    return values
