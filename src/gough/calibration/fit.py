@@ -11,19 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 from gough.calibration import identify
 from gough.calibration.drift import Drifting, fit_drift
 from gough.calibration.estimate import (
-    Estimate,
     Problem,
     State,
-    minimise,
     place_instrument,
     poses_of_readings,
 )
 from gough.calibration.mistakes import FAR, LOOKED_AT, likely_mistake
 from gough.calibration.parameters import Parameters
-from gough.calibration.prediction import refit_drawing
 from gough.calibration.residuals import Rigid
-from gough.calibration.result import NOTICEABLE, SURE, Calibration
-from gough.calibration.robust import find_start, robust_fit
+from gough.calibration.result import Calibration
+from gough.calibration.robust import find_start, plain_fit, robust_fit
 from gough.calibration.sensors import (
     KINDS,
     Bars,
@@ -122,7 +119,7 @@ def calibrate(
     messages = [f"{left_out} of {len(readings)} rows hold NaN and are left out."] * bool(left_out)
     given = _given_place(platform, kind, sensor, targets, stations, problem.free)
     start, rank = _start(problem, given, robust)
-    estimate = robust_fit(problem, start) if robust else minimise(problem, start)
+    estimate = robust_fit(problem, start) if robust else plain_fit(problem, start)
     if time is not None:
         when = as_batch("time", time, ())
         if when.shape != (len(readings),):
@@ -131,10 +128,7 @@ def calibrate(
             raise GoughError("time: a row with measurements has none")
         problem, estimate, drift = fit_drift(problem, estimate, when[rows])
         messages.append(_drift_text(platform, drift))
-    drawn = refit_drawing(problem, start, estimate.weights)
-    found = Calibration(problem, estimate, drawn, rows, rank, messages)
-    messages += _warnings(found)
-    return found
+    return Calibration(problem, estimate, start, rows, rank, tuple(messages))
 
 
 # ---- input ----------------------------------------------------------------------------
@@ -207,7 +201,7 @@ def _given_place(
     return Targets(Rigid.identity(), np.zeros((k, 3)) if points is None else points)
 
 
-# ---- start and warnings ---------------------------------------------------------------
+# ---- start ------------------------------------------------------------------------------
 
 
 def _start(problem: Problem, given: Any, robust: bool) -> tuple[State, int]:
@@ -258,26 +252,6 @@ def _misfit_text(mistake: str | None, what: str) -> str:
     )
 
 
-def _warnings(found: Calibration) -> list[str]:
-    """All there is to say about a fit, most important first."""
-    out = []
-    if not found.better:
-        reason = (
-            f"the probability that it errs less is {found.probability_better:.3f}"
-            if found.probability_better < SURE
-            else f"held-out poses fit better by {found.noticeable:.1f} standard errors only"
-        )
-        out.append(
-            f"The calibrated machine is not surely better than the drawing: {reason} (wanted: "
-            f"{SURE} and {NOTICEABLE:g}). Measure more poses, or with a better instrument."
-        )
-    unseen = identify.in_words(found.problem.sensor, found.residuals.shape[1])
-    if unseen:
-        out.append(unseen)
-    out += _outliers(found) + _noise(found) + _far_parameters(found)
-    return out
-
-
 def _drift_text(platform: Platform, drift: Drifting | None) -> str:
     if drift is None:
         return "The data show no drift over time; the fit is without."
@@ -289,40 +263,3 @@ def _drift_text(platform: Platform, drift: Drifting | None) -> str:
         turned = np.degrees(np.linalg.norm(drift.twist[3:]))
         text += f", the frame by {moved:.3g} {platform.unit} and {turned:.3g} deg"
     return text + " from first to last pose. The calibration is for the middle of the time."
-
-
-def _outliers(found: Calibration) -> list[str]:
-    bad = found.rows[~found.inliers]
-    if not len(bad):
-        return []
-    shown = ", ".join(str(i + 1) for i in bad[:10]) + (", ..." if len(bad) > 10 else "")
-    return [f"{len(bad)} of {len(found.rows)} poses are outliers and left out: rows {shown}."]
-
-
-def _noise(found: Calibration) -> list[str]:
-    """Noise of another size than stated, by chi squared."""
-    estimate: Estimate = found.estimate
-    used = found.inliers
-    count = found.residuals[used].size
-    spent = np.sum(estimate.information * estimate.covariance.T)
-    freedom = max(count - spent, 1.0)
-    ratio = float(np.sum(estimate.distance[used]) / freedom)
-    if abs(ratio - 1) < FOUR * np.sqrt(2 / freedom) or 0.64 < ratio < 1.44:
-        return []
-    text = f"The noise looks {np.sqrt(ratio):.2g} times what sigma and leg_sigma state"
-    if ratio > 1:
-        return [text + ": state more, look for outliers (robust), or fit gains; the predicted "
-                "error is too small by as much."]  # fmt: skip
-    return [text + ": state less, and more is gained from the data."]
-
-
-def _far_parameters(found: Calibration) -> list[str]:
-    share = np.abs(found.changes) / found.parameters.tolerance
-    out = []
-    for leg, column in np.argwhere(share > FOUR)[:6]:
-        out.append(
-            f"Leg {leg + 1}, {found.parameters.names[column]}: {share[leg, column]:.1f} tolerances "
-            f"from the drawing ({found.changes[leg, column]:+.4g} "
-            f"{found.parameters.unit_names[column]}); check the drawing there."
-        )
-    return out

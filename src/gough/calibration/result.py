@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -27,23 +27,35 @@ class Calibration:
     Attributes:
         problem: what was measured, with the layout of the parameters; bad rows are left out.
         estimate: parameters and placement at the optimum, with their covariance.
-        drawn: the drawing with the placement that fits it best.
+        start: the estimate that the fit started from: the drawing.
         rows: (n,) rows of the input that were used.
         rank: how many combinations of the legs' parameters the data fix, the placement known.
-        messages: sentences a person should read.
+        notes: sentences about the input, with which `messages` begins.
     """
 
     problem: Problem
     estimate: Estimate
-    drawn: State
+    start: State
     rows: NDArray[np.intp]
     rank: int
-    messages: list[str] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> Parameters:
         """Layout, drawn values and tolerances of the parameters."""
         return self.problem.parameters
+
+    @cached_property
+    def messages(self) -> list[str]:
+        """Sentences that a person should read."""
+        from gough.calibration.advice import advice
+
+        return [*self.notes, *advice(self)]
+
+    @cached_property
+    def drawn(self) -> State:
+        """The drawing with the placement that fits it best."""
+        return prediction.refit_drawing(self.problem, self.start, self.estimate.weights)
 
     @cached_property
     def platform(self) -> Platform:

@@ -38,7 +38,7 @@ def find_start(problem: Problem, near: Rigid, usable: NDArray[np.bool_], robust:
         for place in _candidates(part[draw], pose[draw]):
             first = State(problem.parameters.drawn, place, pose[draw])
             try:
-                found, _ = place_instrument(part[draw], first, iterations=4 if robust else 20)
+                found, _ = place_instrument(part[draw], first, iterations=2 if robust else 20)
                 score, state = _judge(part, replace(found, near=pose), robust)
             except np.linalg.LinAlgError:
                 continue
@@ -70,6 +70,15 @@ def polish_start(problem: Problem, state: State) -> State:
         weights[distance > 9 * scale] = 0.0
         state, _ = place_instrument(problem, state, weights, iterations=4)
     return state
+
+
+def plain_fit(problem: Problem, start: State) -> Estimate:
+    """Fit all poses alike, most of the way with some of them where there are many."""
+    if len(problem) > 2 * STARTS:
+        some = np.linspace(0, len(problem) - 1, STARTS).astype(int)
+        first = minimise(problem[some], replace(start, near=start.near[some])).state
+        start = replace(first, near=start.near)
+    return minimise(problem, start)
 
 
 def robust_fit(problem: Problem, start: State) -> Estimate:
