@@ -31,6 +31,7 @@ from gough.calibration.residuals import Rigid
 from gough.calibration.sensors import Rows, Sensor
 from gough.errors import GoughError
 from gough.fk.solve import solve
+from gough.platform import Platform
 from gough.pose import Pose
 
 FOUND = 1e-6  # of the machine's size: residual up to which a pose has the readings
@@ -253,12 +254,15 @@ def place_instrument(
     return best
 
 
-def poses_of_readings(problem: Problem) -> tuple[Rigid, NDArray[np.bool_]]:
+def poses_of_readings(
+    problem: Problem, machine: Platform | None = None
+) -> tuple[Rigid, NDArray[np.bool_]]:
     """Solve the readings on the drawing: poses X (n), home where there is none; which are found.
 
-    A pose counts as found out of workspace or stroke, too: the true machine may be within.
+    On another `machine` where one is given. A pose counts as found out of workspace or stroke,
+    too: the true machine may be within.
     """
-    drawing = problem.parameters.drawing
+    drawing = machine or problem.parameters.drawing
     found = solve(drawing, problem.legs)
     usable = found.residual < FOUND * drawing.size  # not so where it is NaN
     at = found.pose

@@ -9,9 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.calibration.arrays import Array
-from gough.calibration.estimate import Estimate, Problem, State, minimise, place_instrument
+from gough.calibration.estimate import (
+    Estimate,
+    Problem,
+    State,
+    minimise,
+    place_instrument,
+    poses_of_readings,
+)
 from gough.calibration.placing import candidates
 from gough.calibration.residuals import Rigid
+from gough.calibration.sensors import PoseSensor
+from gough.errors import PlatformError
 
 STARTS = 80  # poses that a start is sought with
 SUBSETS, SUBSET = 8, 8  # random draws of poses for a robust start, and poses in each
@@ -78,7 +87,31 @@ def plain_fit(problem: Problem, start: State) -> Estimate:
         some = np.linspace(0, len(problem) - 1, STARTS).astype(int)
         first = minimise(problem[some], replace(start, near=start.near[some])).state
         start = replace(first, near=start.near)
-    return minimise(problem, start)
+    return with_right_poses(problem, start, minimise(problem, start))
+
+
+def with_right_poses(problem: Problem, start: State, estimate: Estimate) -> Estimate:
+    """Fit again where the drawing gave a reading the pose of another assembly mode.
+
+    An instrument that measures less than a pose is compared with the pose of the readings. A few of
+    these can be in another mode on the drawing; on the machine without them they are not.
+    """
+    cut = chi_squared(problem.rows(start)[0].errors.shape[1], 2 * CUT)
+    if isinstance(problem.sensor, PoseSensor) or np.all(estimate.distance < cut):
+        return estimate
+    others = robust_fit(problem, start)
+    try:
+        machine = problem.parameters.platform(others.state.values)
+    except PlatformError:
+        return estimate
+    near, found = poses_of_readings(problem, machine)
+    new = found & (others.weights == 0)
+    old = others.state.near
+    mixed = Rigid(
+        np.where(new[:, None, None], near.R, old.R), np.where(new[:, None], near.t, old.t)
+    )
+    again = minimise(problem, replace(others.state, near=mixed))
+    return again if again.cost < estimate.cost else estimate
 
 
 def robust_fit(problem: Problem, start: State) -> Estimate:
