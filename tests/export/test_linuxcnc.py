@@ -55,7 +55,8 @@ class Stub:
         return self.lib.stub_inverse(self._at(world), self._at(joints), tool), joints
 
     def _at(self, array) -> Any:
-        return self.ffi.from_buffer("double[]", np.ascontiguousarray(array, float))
+        values: Any = np.ascontiguousarray(array, float)
+        return self.ffi.from_buffer("double[]", values)
 
 
 @pytest.fixture(scope="module")
@@ -219,4 +220,4 @@ def halrun(folder: Path, module: str, joints: np.ndarray, guess: Pose) -> dict[s
     rows = re.findall(r"^\s+\d+\s+\w+\s+(?:IN|OUT|I/O)\s+(\S+)\s+(\S+)", done.stdout, re.MULTILINE)
     assert rows, done.stdout + done.stderr
     read = {"TRUE": "1", "FALSE": "0"}
-    return {name: float(int(v, 16) if "0x" in v else read.get(v, v)) for v, name in rows}
+    return {name: float(int(v, 16) if "0x" in v else str(read.get(v, v))) for v, name in rows}

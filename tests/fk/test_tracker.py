@@ -261,6 +261,7 @@ def test_twist_comes_from_two_poses_or_from_given_rates(name: str) -> None:
     rate = np.concatenate([platform.workspace.translation[:, 1], [0.1, -0.2, 0.1]])
     tracker = gough.Tracker(platform, start=platform.home, period=period)
     assert np.all(np.isnan(tracker.twist))  # nothing has been followed yet
+    pose, legs = platform.home, platform.home_legs
     for cycle in range(1, 6):
         pose = support.moved(platform.home, rate * cycle * period)
         legs = gough.leg_lengths(platform, pose)

@@ -1,6 +1,7 @@
 """The nonlinear reading of DisGNet: its three forms, and what one 2-FWL step can express."""
 
 from itertools import combinations
+from typing import Any
 
 import torch
 from hypothesis import given, settings
@@ -70,7 +71,7 @@ def test_dense_takes_any_graph():
 def test_tables_converge_to_the_exact_form():
     platform = reference()
     torch.manual_seed(0)  # as training starts; random weights of any size are less smooth
-    model = build("disgnet-nonlinear", platform, Scaling.of(platform)).double().eval()
+    model: Any = build("disgnet-nonlinear", platform, Scaling.of(platform)).double().eval()
     legs = torch.tensor(leg_lengths(platform, platform.sample_poses(50, 5)))
     exact = model.raw(legs)
     model.train()
@@ -98,7 +99,7 @@ def pooled_of(model):
 @torch.no_grad()
 def mixed_difference(function, x, moves):
     """Sum over all subsets of the moves, with alternating sign."""
-    total = 0
+    total = torch.zeros(())
     for count in range(len(moves) + 1):
         for chosen in combinations(moves, count):
             total = total + (-1) ** count * function(x + sum(chosen, torch.zeros_like(x)))

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.errors import GoughError
@@ -63,7 +64,8 @@ def modes_figure(modes: AssemblyModes) -> Figure:
     figure = new_figure(max(left + wide, LEFT), min(max(least, tall), 2 * (left + wide) + 1))
     panels: Any = figure
     if not few:
-        together, panels = figure.subfigures(1, 2, width_ratios=[LEFT, wide])
+        halves: Any = figure.subfigures(1, 2, width_ratios=[LEFT, wide])
+        together, panels = halves
         figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)  # pyright: ignore[reportOptionalMemberAccess, reportCallIssue]
         _draw_together(together, modes, base, joints)
         panels.suptitle("each by itself, all to one scale", fontsize=9)
@@ -105,7 +107,7 @@ def _marks() -> list[Line2D]:
 
 
 def _draw_apart(
-    figure: Any, modes: AssemblyModes, base: Array, joints: Array, order: Array,
+    figure: Any, modes: AssemblyModes, base: Array, joints: Array, order: NDArray[np.intp],
     shape: tuple[int, int],
 ) -> None:  # fmt: skip
     """Draw each pose by itself, all to one scale, seen from the front, right and above."""
