@@ -17,10 +17,10 @@ solve: $(VENV)/.core
 	$(BIN)/gough solve examples/rubin_camera_legs.csv -p rubin_camera
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 quick: $(VENV)/.dev
-	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n auto -q -m "not (slow or torch or browser or process)"
+	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n auto --dist worksteal -q -m "not (slow or torch or browser or process)"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
