@@ -133,13 +133,28 @@ def same_output(printed: str, expected: str) -> bool:
 
 
 def _match(printed: list[str], expected: list[str]) -> bool:
-    if "..." in expected:
-        cut = expected.index("...")
-        head, rest = expected[:cut], expected[cut + 1 :]
-        return _match(printed[:cut], head) and any(
-            _match(printed[i:], rest) for i in range(cut, len(printed) + 1)
-        )
-    return len(printed) == len(expected) and all(map(_same_word, printed, expected))
+    """Compare words; between two `...` each part is taken where it first fits, as in a glob."""
+    parts: list[list[str]] = [[]]
+    for word in expected:
+        parts.append([]) if word == "..." else parts[-1].append(word)
+    head, *rest = parts
+    if not rest:
+        return len(printed) == len(head) and _fits(printed, head)
+    tail = rest.pop()
+    at, end = len(head), len(printed) - len(tail)
+    if end < at or not _fits(printed, head) or not _fits(printed[end:], tail):
+        return False
+    for part in rest:
+        found = next((i for i in range(at, end - len(part) + 1) if _fits(printed[i:], part)), None)
+        if found is None:
+            return False
+        at = found + len(part)
+    return True
+
+
+def _fits(printed: list[str], part: list[str]) -> bool:
+    """True if `printed` begins with the words of `part`."""
+    return len(printed) >= len(part) and all(map(_same_word, printed, part))
 
 
 def _same_word(a: str, b: str) -> bool:
