@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import importlib
 
+import numpy as np
 import pytest
 
 import gough
@@ -14,7 +15,8 @@ MODULES = sorted({getattr(gough, name).__module__ for name in gough.__all__[1:]}
 
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_print_what_they_show(name: str) -> None:
-    failed, _ = doctest.testmod(importlib.import_module(name))
+    known = {"gough": gough, "np": np}
+    failed, _ = doctest.testmod(importlib.import_module(name), extraglobs=known)
     assert not failed
 
 

@@ -76,7 +76,8 @@ def test_ctrl_c_keeps_a_checkpoint_and_says_how_to_go_on(tmp_path, capsys, monke
             signal.raise_signal(signal.SIGINT)
         return learn(self, progress)
 
-    handler = signal.getsignal(signal.SIGINT)
+    handler = signal.default_int_handler  # what started the tests may ignore SIGINT
+    before = signal.signal(signal.SIGINT, handler)
     monkeypatch.setattr(Trainer, "learn", interrupted)
     arguments = ("-p", "reference", "-o", str(folder), "--steps", "12")
     options = ("default", "--model.options", "width", "8", "--data.test", "50")
@@ -86,6 +87,7 @@ def test_ctrl_c_keeps_a_checkpoint_and_says_how_to_go_on(tmp_path, capsys, monke
     assert f"gough train -p reference -o {folder} --resume" in err
     assert load_tensors(folder / CHECKPOINT)[1]["step"] == 3
     assert signal.getsignal(signal.SIGINT) == handler
+    signal.signal(signal.SIGINT, before)
     monkeypatch.undo()
     assert call("train", "-p", "reference", "-o", str(folder), "--resume") == 0
     assert load_tensors(folder / WEIGHTS)[1]["record"]["steps"] == 12

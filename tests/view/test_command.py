@@ -63,7 +63,7 @@ def test_rows_without_a_pose_are_counted(view, tmp_path):
     ("arguments", "message"),
     [
         (["nothing.csv", "-p", "reference"], "nothing.csv: cannot be read"),
-        (["legs.txt", "-p", "reference"], "legs.txt: the name must end in .csv or .parquet"),
+        (["legs.doc", "-p", "reference"], "legs.doc: the name must end in .csv or .parquet"),
         (["-p", "refrence"], "no platform is called 'refrence'"),
         ([EXAMPLE, "-p", "rubin_camera", "--rows", "0"], "--rows 0: expected 2 or more"),
         ([EXAMPLE, "-p", "rubin_camera", "--time", "when"], "no column 'when'"),
