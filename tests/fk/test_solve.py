@@ -113,23 +113,30 @@ def test_a_row_does_not_depend_on_its_neighbours(name):
 
 
 @pytest.mark.slow
-def test_compiling_anew_changes_nothing(tmp_path):
-    """A process that compiles and one that loads the compiled code give the same bits."""
+def test_compiling_anew_changes_nothing_beyond_rounding(tmp_path):
+    """A process that compiles and one that loads the compiled code agree.
+
+    To the bit in the block solver; the row solver's functions may be fused differently when they
+    are compiled beside it, which changes last digits (docs/solver.md).
+    """
     code = (
-        "import gough, hashlib\n"
+        "import gough, sys, numpy as np\n"
         "p = gough.Platform.load('rubin_camera')\n"
-        "s = gough.solve(p, gough.leg_lengths(p, p.sample_poses(500)))\n"
-        "print(hashlib.md5(s.pose.position.tobytes() + s.pose.wxyz.tobytes()).hexdigest())"
+        "for count in (500, 2000):\n"
+        "    s = gough.solve(p, gough.leg_lengths(p, p.sample_poses(count)))\n"
+        "    np.save(f'{sys.argv[1]}-{count}', np.concatenate([s.pose.position, s.pose.wxyz], 1))\n"
     )
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, check=True
-        ).stdout
-        for _ in range(2)
-    ]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "numba")}
+    for name in ("compiled", "loaded"):
+        words = [sys.executable, "-c", code, str(tmp_path / name)]
+        subprocess.run(words, env=environment, check=True)
     assert len(list(tmp_path.rglob("*.nbc"))) > 0
-    assert runs[0] == runs[1]
+    few, many = (
+        [np.load(tmp_path / f"{name}-{count}.npy") for name in ("compiled", "loaded")]
+        for count in (500, 2000)
+    )
+    np.testing.assert_array_equal(*many)
+    np.testing.assert_allclose(*few, rtol=0, atol=1e-14)
 
 
 def test_threads_change_nothing():
