@@ -1,4 +1,4 @@
-"""How well calibrations do, against the bound that statistics allow (Cramer and Rao, with a prior).
+"""Errors of calibrations beside the bound that statistics allow (Cramer and Rao, with a prior).
 
     python benchmarks/calibration.py [--trials 200] [--only bound,before,plan,outliers,...]
 

@@ -1,4 +1,4 @@
-"""How long the first answer takes, and the second: whole processes, caches empty and filled.
+"""Times of the first answer and of the second: whole processes, caches empty and filled.
 
     python benchmarks/first_run.py
 

@@ -60,7 +60,7 @@ class Case:
         return guess.distance(self.pose)[0] / self.platform.size
 
     def missed(self, guess: gough.Pose) -> str:
-        """How often plain Newton from a guess does not end at the true pose."""
+        """Count guesses from which plain Newton does not end at the true pose."""
         from gough.learn.metrics import count_newton_ends
 
         ends = count_newton_ends(self.platform, guess, self.pose, self.legs)
@@ -98,7 +98,7 @@ NAMES = (
 
 
 def seeds(platform: gough.Platform) -> dict[str, Any]:
-    """What is compared: names and objects with `guess(legs)`."""
+    """First guesses to compare: names and objects with `guess(legs)`."""
     made = (
         gough.PolynomialSeed(platform, 0), TaylorSeed(platform, 2), Closed(platform, 2),
         gough.PolynomialSeed(platform, 3), Network(platform), UniversalSeed(platform),
@@ -112,7 +112,7 @@ def accuracy() -> None:
 
 
 def newton() -> None:
-    """How many of 100,000 poses plain Newton misses from each guess, over the same boxes."""
+    """Print how many of 100,000 poses plain Newton misses from each guess, over the same boxes."""
     names = ("home", "taylor-2", "polynomial-3, fitted", "universal")
     _table(NARROW, NEWTON_POSES, Case.missed, names)
 
@@ -171,7 +171,7 @@ def random() -> None:
 
 
 def predicted() -> None:
-    """How often the error is below three times its prediction, and how sharp that is."""
+    """Print how often the error is below three times its prediction, and their usual ratio."""
     print("| machines | below 3 x the prediction, % | prediction / error, median |")
     print("|---|---:|---:|")
     groups = {f"{n}, ±{100 * b[0]:g} %, ±{b[1]}°": [Case.of(gough.Platform.load(n), b, POSES)]

@@ -137,7 +137,7 @@ def with_some_workspace(platform: Platform) -> Platform:
 
 
 def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
-    """The same machine with its lengths told in another unit."""
+    """The same machine with its lengths in another unit."""
     arms, space, stroke = platform.rotary, platform.workspace, platform.stroke
     if arms is not None:
         arms = replace(

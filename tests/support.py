@@ -97,7 +97,7 @@ def moved(pose: Pose, twist: Floats) -> Pose:
 
 
 def reading_scale(platform: Platform) -> float:
-    """What a rounding error of a reading is relative to."""
+    """Scale of rounding errors of a reading: the size, or 1 rad for rotary legs."""
     return 1.0 if platform.legs == "rotary" else platform.size
 
 

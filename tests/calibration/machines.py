@@ -75,7 +75,7 @@ def measure(
 
 
 def options(known: Truth, sigma: tuple[float, float] = TRACKER, leg: float = LEG) -> dict[str, Any]:
-    """What `calibrate` is told of the noise."""
+    """Options of `calibrate` that state the noise."""
     return {
         "sigma": (sigma[0] * known.mm, sigma[1]), "leg_sigma": leg * known.mm,
         "tolerance": 0.5 * known.mm,

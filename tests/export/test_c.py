@@ -46,7 +46,7 @@ def test_a_smooth_drive_is_followed_as_in_python(built, name: str, real) -> None
 @settings(max_examples=6)
 @given(st.sampled_from(KINDS), support.seeds)
 def test_faults_have_the_events_of_python(built, name: str, seed: int) -> None:
-    """Where no other start is involved; where one is, both agree again within 30 cycles."""
+    """Compare events to the letter; where other starts are involved, within 30 cycles."""
     platform = Platform.load(name)
     drive = path(platform, 400, seed, cycles=1000.0)
     legs, _ = faulty(platform, drive, seed)

@@ -85,7 +85,7 @@ def test_tables_converge_to_the_exact_form():
 
 
 def pooled_of(model):
-    """What the readout sees, as a function of one reading (6,)."""
+    """Input of the readout as a function of one reading (6,)."""
     seen = []
     model.readout.register_forward_pre_hook(lambda module, args: seen.append(args[0].detach()))
 

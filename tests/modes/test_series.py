@@ -176,7 +176,7 @@ def test_inverse_exchanges_base_and_platform():
 
 @pytest.mark.parametrize("name", ["rubin_simulink", "reachy_mini", "nasa_msfc"])
 def test_leg_equations_are_the_struts(name):
-    """What the compiled refinement repeats, against `gough.struts`, in normalised units."""
+    """Compare the struts of the compiled code with those of `gough.struts`."""
     platform = gough.Platform.load(name)
     pose = poses_of(platform, 1)
     frames = Frames.of(platform)

@@ -49,7 +49,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What was measured, and how well.
+    """Measurements of an instrument, and their standard deviations.
 
     Attributes:
         parameters: layout, drawing and tolerance.
@@ -95,7 +95,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Where the minimisation ended.
+    """Result of a minimisation.
 
     Attributes:
         state: parameters and placement.

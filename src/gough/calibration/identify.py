@@ -32,7 +32,7 @@ WORDS = {
 
 
 def rank(parameters: Parameters, sensor: Sensor, place: object) -> int:
-    """How many of the 6 K combinations the instrument fixes, were its placement known.
+    """Number of the 6 K combinations that the instrument fixes if its placement is known.
 
     From many poses spread over the workspace: what more poses of the same kind could show.
     """
@@ -58,7 +58,7 @@ def numerical_rank(A: Array) -> int:
 
 
 def in_words(sensor: Sensor, numbers: int) -> str:
-    """What an instrument cannot see by its nature, a sentence, or nothing."""
+    """Sentence on what an instrument cannot see by its nature; empty if there is nothing."""
     kind = "one distance" if sensor.kind == "distances" and numbers == 1 else sensor.kind
     return WORDS[kind]
 

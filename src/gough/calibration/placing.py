@@ -1,4 +1,4 @@
-"""Where an instrument stands, before anything else is known: first placements to refine.
+"""First placements of an instrument, found before anything else is known, to be refined.
 
 The readings and the drawing give poses X_k that are off by the drawing's errors only. Several
 closed forms then place the instrument; the caller refines each and keeps the best.

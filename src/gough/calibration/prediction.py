@@ -62,7 +62,7 @@ class Workspace:
                               axis=-1), pose  # fmt: skip
 
     def differences(self, a: State, b: State) -> Array:
-        """What the instrument would measure on machine a minus on machine b, (t, m)."""
+        """Difference of the measurements of two machines, a minus b, (t, m)."""
         parameters = self.problem.parameters
         seen = [(s.place, forward(parameters, s.values, self.legs, self.near)[0]) for s in (a, b)]
         return self.problem.sensor.difference(*seen)

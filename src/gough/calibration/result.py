@@ -148,7 +148,7 @@ class Calibration:
 
     @property
     def better(self) -> bool:
-        """Whether the machine is surely better than its drawing; else it should not be used."""
+        """True if the calibrated machine is surely better than its drawing; else do not use it."""
         return self.probability_better >= SURE and self.noticeable >= NOTICEABLE
 
     def __repr__(self) -> str:

@@ -180,7 +180,7 @@ class _ThroughReadings:
     """Instruments that are compared with the pose that the readings have."""
 
     def difference(self, a: tuple[Any, Rigid], b: tuple[Any, Rigid]) -> Array:
-        """What is measured at placement and pose a minus that at b, (n, m)."""
+        """Difference of the measurements at placements and poses a and b, (n, m)."""
         return self.predicted(*a) - self.predicted(*b)
 
     def predicted(self, place, pose: Rigid) -> Array:

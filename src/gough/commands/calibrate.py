@@ -117,7 +117,7 @@ def _points(name: str, numbers: tuple[float, ...]) -> Array | None:
 
 
 def _summary(calibration: Calibration) -> str:
-    """What was found, a line each."""
+    """Findings as text, one line each."""
     import numpy as np
 
     from gough.calibration.words import error_text

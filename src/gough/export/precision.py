@@ -1,4 +1,4 @@
-"""What the exported C calls zero, small and equal, for each of its two kinds of number."""
+"""Tolerances of the exported C, for each of its two kinds of number."""
 
 from __future__ import annotations
 

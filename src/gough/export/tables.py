@@ -83,7 +83,7 @@ def _definition(name: str, value: Array, precision: Precision) -> str:
 
 
 def _arithmetic(precision: Precision) -> list[str]:
-    """How numbers of this kind are written, and their functions called."""
+    """Spelling of C literals and names of C functions for one kind of number."""
     names = ("sqrt", "fabs", "sin", "cos")
     functions = [f"#define {name.upper()} {name}{precision.suffix}" for name in names]
     return [

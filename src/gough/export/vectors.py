@@ -1,4 +1,4 @@
-"""What the exported test compares with: readings, and what the Python tracker makes of them."""
+"""Test vectors of the exported C: readings, and the events and poses of the Python tracker."""
 
 from __future__ import annotations
 

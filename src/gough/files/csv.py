@@ -300,7 +300,7 @@ def _value(text: str, kind: pa.DataType, decimal: str) -> object:
 
 
 def _complaint(text: str, kind: pa.DataType) -> str:
-    """What is wrong with a field that is not of this kind."""
+    """Describe the fault of a field that is not of this kind."""
     if pa.types.is_string(kind):
         return "not UTF-8 text; save the file as UTF-8"
     shown = repr(text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")[:40])

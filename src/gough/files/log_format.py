@@ -42,7 +42,7 @@ UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$")
 
 @dataclass(frozen=True)
 class LogFormat:
-    """How a log states leg readings: reading = scale * value + offset, in `unit`.
+    """Form of the leg readings of a log: reading = scale * value + offset, in `unit`.
 
     Attributes:
         columns: the six columns in the order of the legs, by name or by number from 1; empty to

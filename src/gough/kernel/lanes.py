@@ -152,7 +152,7 @@ class _Slots:
         return self.builder.bitcast(self._pointer(k, LANES), _VECTOR.as_pointer())
 
     def _pointer(self, k: int | _Index, size: int) -> Any:
-        """Where entry k * size of the array is."""
+        """Address of entry k * size of the array."""
         if isinstance(k, _Index):
             place = self.builder.mul(k.value, k.value.type(k.scale * size))
             place = self.builder.add(place, place.type(k.offset * size))

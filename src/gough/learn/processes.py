@@ -1,4 +1,4 @@
-"""Where a run computes: its device, and its processes as torchrun starts them."""
+"""Device of a run, and its processes as torchrun starts them."""
 
 from __future__ import annotations
 

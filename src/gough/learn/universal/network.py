@@ -66,7 +66,7 @@ class Universal(nn.Module):
         return channels(self.last, h)[0]
 
     def parameter_count(self) -> int:
-        """How many numbers training can change."""
+        """Number of trainable parameters."""
         return sum(p.numel() for p in self.parameters())
 
 
@@ -104,7 +104,7 @@ def channels(layer: nn.Module, h: Tensor) -> Tensor:
 
 
 def pair_features(base: Tensor, joints: Tensor, inverse: Tensor) -> Tensor:
-    """What is known of each two legs at home, (P, M, 6, 6).
+    """Features of each pair of legs at home, (P, M, 6, 6).
 
     The distances between all joints determine the machine up to its frames and its mirror image.
     The rest makes plain what follows from them: angles between legs, and by column j of the
