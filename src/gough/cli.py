@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import os
-import re
 import signal
 import sys
-import textwrap
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from importlib import import_module
 
 import gough
-from gough.commands import COMMANDS, signals
+from gough.commands import COMMANDS, help_text, signals
 from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
-WIDTH = 79  # of help texts
+Functions = Callable[..., int] | dict[str, Callable[..., int]]  # dict: a family of commands
 EXTRAS = {"matplotlib": "plot", "viser": "view"} | dict.fromkeys(
     ("torch", "roma", "safetensors", "onnx", "onnxscript", "scipy", "tensorboard"), "learn"
 )
@@ -83,57 +81,44 @@ def _stopped(name: str, number: int) -> int:
 
 def _call_command(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        print(_help(), file=sys.stdout if arguments else sys.stderr)
+        print(help_text.overview(), file=sys.stdout if arguments else sys.stderr)
         return 0 if arguments else BAD_USAGE
     command, rest = arguments[0], arguments[1:]
     if command in ("-V", "--version", "version"):
         print(f"gough {gough.__version__}")
         return 0
+    if command == "--print-completion":
+        from gough.commands.completion import print_completion
+
+        print_completion(rest, {name: _functions(name) for name in COMMANDS})
     if command not in COMMANDS:
         near = suggestion(command, COMMANDS)
         raise GoughError(f"no command {command!r}{near} commands are {', '.join(COMMANDS)}")
+    wants_help = "-h" in rest or "--help" in rest
+    with help_text.tidied() if wants_help else nullcontext():
+        return _parse(f"gough {command}", _functions(command), rest)
+
+
+def _functions(command: str) -> Functions:
+    """The function of a command, or those of a family by name, with docstrings laid out."""
+    module, name, _ = COMMANDS[command]
+    found = getattr(import_module(module), name)
+    for each in found.values() if isinstance(found, dict) else [found]:
+        each.__doc__ = help_text.laid_out(each.__doc__ or "")
+    return found
+
+
+def _parse(program: str, functions: Functions, arguments: list[str]) -> int:
+    """Parse the arguments of a command and call its function."""
     import tyro
 
-    module, function, _ = COMMANDS[command]
-    run = getattr(import_module(module), function)
-    for each in run.values() if isinstance(run, dict) else [run]:
-        each.__doc__ = _laid_out(each.__doc__ or "")
     # flags are --flag alone, without a --no-flag beside it
     config = (tyro.conf.FlagCreatePairsOff,)
-    if isinstance(run, dict):  # a family of commands, by name
+    if isinstance(functions, dict):
         return tyro.extras.subcommand_cli_from_dict(
-            run, prog=f"gough {command}", args=rest, config=config
+            functions, prog=program, args=arguments, config=config
         )
-    return tyro.cli(run, prog=f"gough {command}", args=rest, config=config)
-
-
-def _laid_out(docstring: str) -> str:
-    """A docstring with paragraphs that fit a screen, and one line for each option.
-
-    tyro wraps the options; of other paragraphs it joins all lines that begin with a letter.
-    """
-    text, head, options = inspect.cleandoc(docstring).partition("\nArgs:")
-    paragraphs = [
-        "\n".join(textwrap.wrap(paragraph, WIDTH, subsequent_indent="  "))
-        for paragraph in text.split("\n\n")
-    ]
-    return "\n\n".join(paragraphs) + head + re.sub(r"\n {8}", " ", options)
-
-
-def _help() -> str:
-    lines = [f"  {name:<11} {text}" for name, (_, _, text) in COMMANDS.items()]
-    return "\n".join(
-        [
-            "usage: gough COMMAND [OPTIONS]",
-            "",
-            "Forward kinematics of hexapods: poses from the lengths of their legs, and back.",
-            "",
-            "commands:",
-            *lines,
-            "",
-            "gough COMMAND --help lists the options; gough --version prints the version.",
-        ]
-    )
+    return tyro.cli(functions, prog=program, args=arguments, config=config)
 
 
 def _print_error(text: str) -> int:

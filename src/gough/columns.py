@@ -93,9 +93,15 @@ def pose_names(angles: Angles | None) -> tuple[str, ...]:
     return POSITION + {None: QUATERNION, "deg": EULER_DEG, "rad": EULER}[angles]
 
 
+def deviation_names(angles: Angles | None) -> tuple[str, ...]:
+    """The columns of standard deviations of a pose, of angles in degrees for "deg", else in rad."""
+    ending = "_deg" if angles == "deg" else ""
+    return DEVIATIONS[:3] + tuple(name + ending for name in DEVIATIONS[3:])
+
+
 def solution_names(angles: Angles | None, covariance: bool, radius: bool) -> tuple[str, ...]:
     """The columns of solved rows in files and tables."""
-    optional = DEVIATIONS * covariance + (RADIUS,) * radius
+    optional = deviation_names(angles) * covariance + (RADIUS,) * radius
     return (*pose_names(angles), STATUS, RESIDUAL, ITERATIONS, *optional)
 
 

@@ -75,7 +75,7 @@ def test_angles_and_leg_noise(gough, tmp_path):
     assert gough(*arguments, "--angles", "deg", "--leg-noise", "1e-6").code == 0
     assert out.read_text().splitlines()[0] == (
         "x,y,z,rx_deg,ry_deg,rz_deg,status,residual,iterations,"
-        "std_x,std_y,std_z,std_rx,std_ry,std_rz"
+        "std_x,std_y,std_z,std_rx_deg,std_ry_deg,std_rz_deg"
     )
 
 
@@ -143,7 +143,7 @@ def test_version(gough):
     [
         ([], "usage: gough COMMAND"),
         (["slove"], "did you mean 'solve'"),
-        (["solve"], "LEGS"),
+        (["solve"], "--platform"),
         (["solve", "x.csv"], "--platform"),
         (["solve", "x.csv", "-p", "reference", "--angels", "deg"], "--angles"),
         (["solve", "x.csv", "-p", "reference", "--angles", "grad"], "grad"),

@@ -31,7 +31,7 @@ def test_parquet_of_many_readings_gives_the_poses_back(tmp_path, capsys):
     table = parquet.read_table(out).to_pydict()
     position = np.stack([table[k] for k in "xyz"], axis=-1)
     pose = gough.Pose(position, np.stack([table[k] for k in ("qw", "qx", "qy", "qz")], axis=-1))
-    assert np.abs(gough.leg_lengths(platform, pose) - legs[table["row"]]).max() < 1e-9
+    assert np.abs(gough.leg_lengths(platform, pose) - legs[np.array(table["row"]) - 1]).max() < 1e-9
     assert "5 sets of readings" in capsys.readouterr().out
 
 

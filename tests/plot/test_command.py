@@ -52,8 +52,8 @@ def test_a_pose_in_three_ways_is_one_picture(gough_command, ending):
     numbers = np.array([float(v) for v in SIX])
     legs = gough.leg_lengths(platform, gough.Pose.from_euler(numbers[:3], np.radians(numbers[3:])))
     Path("poses.csv").write_text("x,y,z,rx_deg,ry_deg,rz_deg\n0,0,600,0,0,0\n" + ",".join(SIX))
-    as_legs = ("--legs", *map(repr, map(float, legs)))
-    for k, given in enumerate((SIX, as_legs, ("poses.csv", "--row", 2))):
+    as_legs = tuple(map(repr, map(float, legs)))
+    for k, given in enumerate((("--pose", *SIX), as_legs, ("poses.csv", "--row", 2))):
         out = f"{k}.{ending}"
         code, _, err = gough_command("plot", "pose", *given, "-p", "reference", "-o", out)
         assert (code, err) == (0, "")
@@ -63,7 +63,7 @@ def test_a_pose_in_three_ways_is_one_picture(gough_command, ending):
 
 def test_legs_are_solved_and_their_status_said(gough_command):
     legs = ("652.1", "660.3", "655.0", "648.8", "671.2", "639.9")
-    code, out, _ = gough_command("plot", "pose", "--legs", *legs, "-p", "reference")
+    code, out, _ = gough_command("plot", "pose", *legs, "-p", "reference")
     assert code == 0
     assert out.startswith("converged: The pose has these leg readings")
 
@@ -94,14 +94,15 @@ def test_errors_of_several_files(gough_command):
         (["pose", "-p", "refrence"], "did you mean 'reference'"),
         (["pose", "1", "2", "3", "-p", "reference"], "found 3"),
         (["pose", "1", "2", "3", "4", "5", "six", "-p", "reference"], "six"),
-        (["pose", "1", "2", "3", "4", "5", "nan", "-p", "reference"], "finite"),
-        (["pose", *SIX, "--legs", *SIX, "-p", "reference"], "not both"),
-        (["pose", "--legs", *["nan"] * 6, "-p", "reference"], "holds NaN"),
+        (["pose", "--pose", *["1"] * 5, "nan", "-p", "reference"], "row 1 has no pose"),
+        (["pose", *SIX, "--pose", *SIX, "-p", "reference"], "not both"),
+        (["pose", *["nan"] * 6, "-p", "reference"], "row 1 has no pose: invalid_input"),
         (["pose", str(EXAMPLE), "--row", "5000", "-p", "rubin_camera"], "rows are 1 to 1000"),
         (["pose", "-p", "reference", "-o", "a.jpg"], "must end in .svg, .png or .pdf"),
         (["pose", "-p", "reference", "-o", "no/a.svg"], "there is no folder"),
         (["pose", "-p", "reference", "-o", "."], "must end in"),
         (["modes", "1", "2", "-p", "reference"], "expected six readings"),
+        (["modes", "--row", "2", "-p", "reference"], "rows are 1 to 1"),
         (["modes", "no.csv", "-p", "reference"], "no.csv: cannot be read"),
         (["workspace", "-p", "reference", "--axes", "x", "x"], "two different"),
         (["workspace", "-p", "reference", "--x", "1"], "axis of the slice"),

@@ -17,8 +17,8 @@ pytest.importorskip("matplotlib")
 import gough
 from gough.columns import LEGS
 from gough.files import Reading
+from gough.files.trajectory import read_row
 from gough.plot import Envelope, trajectory_figure
-from gough.plot.pose import read_pose
 from gough.plot.trajectory import SIGNALS, note, read_trajectory, signals
 
 MACHINES = ("reference", "nasa_msfc", "rubin_camera", "reachy_mini", "dietmaier")
@@ -141,11 +141,11 @@ def test_one_row_of_a_file_is_a_pose(tmp_path):
     legs = gough.leg_lengths(platform, poses)
     legs[3] = np.nan
     path = legs_file(tmp_path, platform, legs)
-    shift, turn = read_pose(path, platform, 7).distance(poses[6])
+    shift, turn = read_row(path, platform, 7).pose[0].distance(poses[6])
     assert max(shift / platform.size, turn) < 1e-12
     for row, words in ((4, "row 4 has no pose"), (0, "rows are 1 to 20"), (21, "no row 21")):
         with pytest.raises(gough.InputError, match=words):
-            read_pose(path, platform, row)
+            read_row(path, platform, row)
 
 
 def test_files_of_neither_kind_and_of_other_platforms_are_refused(tmp_path):

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from gough.commands.options import PlatformName
+from gough.commands.options import Json, PlatformName, option
 
 if TYPE_CHECKING:
     from gough.calibration.result import Calibration
     from gough.checks import Array
 
-Points = Annotated[tuple[float, ...], arg(metavar="X Y Z", help_behavior_hint="")]
-Text = Annotated[str | None, arg(metavar="FILE", help_behavior_hint="")]
+Points = Annotated[tuple[float, ...], option(metavar="X Y Z")]
 
 
 def run(
@@ -23,18 +22,19 @@ def run(
     sigma: Annotated[tuple[float, ...], arg(metavar="S")],
     leg_sigma: Annotated[float, arg(metavar="S")],
     tolerance: Annotated[float, arg(metavar="T")],
-    out: Annotated[str | None, arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")] = None,
+    out: Annotated[str | None, option(metavar="OUT", aliases=["-o"])] = None,
+    json: Json = False,
     measured: Literal["pose", "position", "targets", "distances", "inclinometer"] = "pose",
-    gains: bool = False,
+    gains: Annotated[bool, option()] = False,
     frames: Literal["unknown", "known"] = "unknown",
-    robust: bool = False,
-    drift: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None,
+    robust: Annotated[bool, option()] = False,
+    drift: Annotated[str | None, option(metavar="COLUMN")] = None,
     targets: Points = (),
     stations: Points = (),
-    report: Text = None,
-    force: bool = False,
+    report: Annotated[str | None, option(metavar="FILE")] = None,
+    force: Annotated[bool, option()] = False,
 ) -> int:
-    """The machine as it is, from poses measured on it.
+    """Fit joints and sensors of a machine to poses measured on it.
 
     gough calibrate measured.csv -p mine.toml -o calibrated.toml --sigma 0.01 0.002
         --leg-sigma 0.003 --tolerance 0.5
@@ -46,21 +46,22 @@ def run(
     Exit code 0: the new file was written; 1: it was not, as the drawing may be better; 2: error.
 
     Args:
-        measured_file: .csv or .parquet file of measurements, or - for CSV on standard input.
-        sigma: standard deviation of what was measured: position [platform unit] and rotation
-            [deg] for poses, else one number; of an inclinometer in [deg].
-        leg_sigma: standard deviation of the readings, in their unit (motor angles: rad).
-        tolerance: standard deviation of joints from the drawing [platform unit].
-        out: .toml file to write.
-        measured: what the instrument measured.
-        gains: fit a gain of each leg's sensor, too.
-        frames: known: measurements are in base coordinates, of the platform itself.
-        robust: find outliers and leave them out.
-        drift: column of time; fit a slow change of offsets and frame over it.
-        targets: points looked at [platform coordinates], three numbers each.
-        stations: fixed ends of distances [base coordinates], three numbers each.
-        report: .html file with figures to write.
-        force: write the file although the drawing may be better.
+        measured_file: Read the measurements from this file, .csv, .txt, .tsv, .xlsx or .parquet,
+            or from standard input (-).
+        sigma: State the standard deviation of what was measured: position [platform unit] and
+            rotation [deg] for poses, else one number; of an inclinometer in [deg].
+        leg_sigma: State the standard deviation of the readings, in their unit (motor angles: rad).
+        tolerance: State the standard deviation of joints from the drawing [platform unit].
+        out: Write the calibrated machine to this .toml file.
+        measured: State what the instrument measured.
+        gains: Fit a gain of each leg's sensor, too.
+        frames: Pass known if measurements are in base coordinates, of the platform itself.
+        robust: Find outliers and leave them out.
+        drift: Fit a slow change of offsets and frame over this column of time.
+        targets: State the points looked at [platform coordinates], three numbers each.
+        stations: State the fixed ends of distances [base coordinates], three numbers each.
+        report: Write a report with figures to this .html file.
+        force: Write the file although the drawing may be better.
     """
     import numpy as np
 
@@ -89,22 +90,25 @@ def run(
         targets=_points("targets", targets), stations=_points("stations", stations),
         time=found.time,
     )  # fmt: skip
-    print(_summary(calibration))
-    for text in calibration.messages:
-        print(f"- {text}")
+    lines = [_summary(calibration), *(f"- {text}" for text in calibration.messages)]
     if report is not None:
         from gough.calibration.report import write_report
 
         write_report(calibration, report)
-        print(f"wrote {report}")
-    if out is None:
-        return 0 if calibration.better else 1
-    if not (calibration.better or force):
-        print(f"{out} was not written: the drawing may be better; --force writes it")
-        return 1
-    calibration.platform.save(out)
-    print(f"wrote {out}")
-    return 0
+        lines.append(f"wrote {report}")
+    written = out is not None and (calibration.better or force)
+    if written:
+        calibration.platform.save(out)
+        lines.append(f"wrote {out}")
+    elif out is not None:
+        lines.append(f"{out} was not written: the drawing may be better; --force writes it")
+    if json:
+        from gough.commands import as_json
+
+        as_json.print_json(_facts(calibration) | {"written": out if written else None})
+    else:
+        print("\n".join(lines))
+    return 0 if written or (out is None and calibration.better) else 1
 
 
 def _points(name: str, numbers: tuple[float, ...]) -> Array | None:
@@ -114,6 +118,30 @@ def _points(name: str, numbers: tuple[float, ...]) -> Array | None:
     if len(numbers) % 3:
         raise GoughError(f"--{name}: expected three numbers a point, found {len(numbers)} in all")
     return as_batch(name, list(numbers), ()).reshape(-1, 3) if numbers else None
+
+
+def _facts(calibration: Calibration) -> dict:
+    """Findings for JSON; angles of errors in degrees."""
+    import numpy as np
+
+    before, after = (
+        {"position": error.position, "rotation_deg": np.degrees(error.rotation)}
+        for error in (calibration.error_before, calibration.predicted_error)
+    )
+    ours, theirs = calibration.cross_validated
+    return {
+        "platform": calibration.platform.to_dict(),
+        "rows": len(calibration.inliers),
+        "used": np.sum(calibration.inliers),
+        "rank": calibration.rank,
+        "parameters": calibration.changes.size,
+        "error_as_drawn": before,
+        "error_calibrated": after,
+        "held_out_as_drawn": theirs,
+        "held_out_calibrated": ours,
+        "better": calibration.better,
+        "messages": calibration.messages,
+    }
 
 
 def _summary(calibration: Calibration) -> str:

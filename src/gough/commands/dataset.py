@@ -5,20 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from gough.commands.options import PlatformName, SameAssembly, WorkspaceBox, option
+from tyro.conf import arg
+
+from gough.commands.options import (
+    PlatformName,
+    RandomSeed,
+    SameAssembly,
+    WorkspaceBox,
+    option,
+)
 
 
 def run(
     *,
     platform: PlatformName,
     out: Annotated[Path, option("Write to this file, .parquet or .csv.", "OUT", aliases=["-o"])],
-    count: int = 500_000,
-    seed: int = 0,
+    count: Annotated[int, arg(metavar="N")] = 500_000,
+    random_seed: RandomSeed = 0,
     layout: Literal["compact", "paper"] = "compact",
     rotation: Literal["quaternion", "euler"] = "quaternion",
     workspace: WorkspaceBox = None,
     same_assembly: SameAssembly = False,
-    processes: int = 1,
+    processes: Annotated[int, arg(metavar="N")] = 1,
 ) -> int:
     """Make poses and readings to train on, as the DisGNet paper does.
 
@@ -30,7 +38,6 @@ def run(
 
     Args:
         count: Make this many rows.
-        seed: Draw from this seed of the random numbers.
         layout: Write compact columns (pose, readings) or the paper's (translation and rotation from
             home, readings, 12 x 12 distance matrix).
         rotation: Write quaternions, or Euler angles with R = Rx Ry Rz [rad].
@@ -39,7 +46,7 @@ def run(
     from gough.learn.data import DatasetSpec, write_dataset
     from gough.platform import Platform
 
-    spec = DatasetSpec(count, seed, same_assembly)
+    spec = DatasetSpec(count, random_seed, same_assembly)
     machine = Platform.load(platform)
     if workspace is not None:
         machine = machine.with_workspace(*workspace)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
-from gough.commands.options import PlatformName, SameAssembly, WorkspaceBox, option
+from gough.commands.options import Json, PlatformName, SameAssembly, WorkspaceBox, option
 
 if TYPE_CHECKING:
     from gough.learn.evaluate import Row
@@ -19,13 +20,13 @@ def run(
     names: Annotated[Positional[tuple[str, ...]], option(metavar="[NAME ...]")] = (),
     *,
     platform: PlatformName = "reference",
-    poses: int = 100_000,
+    poses: Annotated[int, arg(metavar="N")] = 100_000,
     workspace: WorkspaceBox = None,
     same_assembly: SameAssembly = False,
     train_peers: Annotated[str | None, option(metavar="TIME")] = None,
-    folder: Path = Path("runs/peers"),
-    json: Annotated[Path | None, option(metavar="FILE")] = None,
-    speed: bool = False,
+    folder: Annotated[Path, arg(metavar="FOLDER")] = Path("runs/peers"),
+    json: Json = False,
+    speed: Annotated[bool, option()] = False,
 ) -> int:
     """Compare first guesses: errors, where Newton's method ends, time.
 
@@ -40,9 +41,9 @@ def run(
         poses: Measure errors over this many held-out poses.
         train_peers: First train every network for this time, such as 4m.
         folder: Train them in this folder.
-        json: Write all numbers to this file.
         speed: Time the forms of DisGNet instead: dense, structured, tables.
     """
+    from gough.commands import as_json
     from gough.learn import evaluate as loop
     from gough.platform import Platform
 
@@ -50,17 +51,17 @@ def run(
     if workspace is not None:
         machine = machine.with_workspace(*workspace)
     if speed:
-        print("\n".join(loop.measure_speed(machine).lines()))
+        found = loop.measure_speed(machine)
+        as_json.print_json(asdict(found)) if json else print("\n".join(found.lines()))
         return 0
     chosen = list(names) or loop.default_names(machine)
     if train_peers is not None:
         chosen += loop.train_peers(machine, folder, train_peers)
     rows = loop.evaluate(machine, chosen, poses=poses, same_assembly=same_assembly)
-    _print(machine, rows)
-    if json is not None:
-        from gough.whole_file import write_whole
-
-        write_whole(json, loop.to_json(rows).encode())
+    if json:
+        as_json.print_json([asdict(row) for row in rows])
+    else:
+        _print(machine, rows)
     return 0
 
 

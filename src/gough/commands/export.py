@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from tyro.conf import arg
-
-from gough.commands.options import PlatformName
+from gough.commands.options import PlatformName, option
 
 
 def c(
     *,
     platform: PlatformName,
-    out: Annotated[str, arg(aliases=["-o"], metavar="FOLDER")],
-    prefix: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    out: Annotated[str, option(metavar="FOLDER", aliases=["-o"])],
+    prefix: Annotated[str | None, option(metavar="NAME")] = None,
     real: Literal["double", "float"] = "double",
-    linuxcnc: Annotated[bool, arg(help_behavior_hint="")] = False,
-    unit: Annotated[Literal["mm", "inch"], arg()] = "mm",
-    force: Annotated[bool, arg(help_behavior_hint="")] = False,
+    linuxcnc: Annotated[bool, option()] = False,
+    unit: Literal["mm", "inch"] = "mm",
+    force: Annotated[bool, option()] = False,
 ) -> int:
-    """C99 for this one machine: poses from readings in bounded time, without any library.
+    """Write C99 for one machine: poses from readings in bounded time, without any library.
 
     gough export c -p reachy_mini -o reachy
 
@@ -29,12 +27,12 @@ def c(
     CMakeLists.txt and README.md. The files may be used and linked with anything (MIT-0).
 
     Args:
-        out: folder to write to; it is made if it is missing.
-        prefix: what all C names and file names begin with; without it the platform's name.
-        real: type of all numbers; float for processors that compute no other fast.
-        linuxcnc: write one file instead, NAMEkins.comp, for LinuxCNC's halcompile --install.
-        unit: with --linuxcnc: LINEAR_UNITS of the configuration, which lengths are converted to.
-        force: replace files that exist.
+        out: Write to this folder, which is made if it is missing.
+        prefix: Begin all C names and file names with this; without it with the platform's name.
+        real: Use this type for all numbers; float for processors that compute no other fast.
+        linuxcnc: Write one file instead, NAMEkins.comp, for LinuxCNC's halcompile --install.
+        unit: Convert lengths to this unit for --linuxcnc, LINEAR_UNITS of the configuration.
+        force: Replace files that exist.
     """
     from gough.export.c import c_files
     from gough.export.folder import write_folder

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional
 
 from gough.commands.options import (
     AllowFailures,
     BlockRows,
     Head,
     IgnorePlatform,
+    Json,
     Keep,
     KeepBadRows,
     LogOptions,
     Out,
     PlatformName,
+    option,
     reading_options,
 )
 
 
 def run(
-    poses: Annotated[Positional[str], arg(metavar="POSES")],
+    poses: Annotated[Positional[tuple[str, ...]], option(metavar="[POSES]")] = (),
     *,
     platform: PlatformName,
     out: Out = None,
@@ -30,32 +32,41 @@ def run(
     allow_failures: AllowFailures = False,
     ignore_platform: IgnorePlatform = False,
     head: Head = 5,
+    json: Json = False,
     block_rows: BlockRows = 65536,
     log: OmitArgPrefixes[LogOptions] = LogOptions(),  # noqa: B008 - frozen
 ) -> int:
-    """Calculate leg readings from a file of poses.
+    """Calculate leg readings from poses.
+
+    gough inverse 20 -10 610 5 3 -4 -p reference
 
     gough inverse poses.csv -p rubin_camera -o legs.parquet
 
-    Columns of a pose: x, y, z in the platform's unit, and its rotation:
-
-    qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz).
+    Columns of a pose in a file are x, y, z in the platform's unit, and its rotation: qw, qx, qy,
+    qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz).
 
     Exit code 0: all rows have readings; 1: some have none; 2: nothing was written.
 
     Args:
-        poses: Read this .csv or .parquet file with these columns, or CSV from standard input (-).
+        poses: Take this pose, six numbers x y z rx ry rz with angles in degrees, or the poses in
+            this file, .csv, .txt, .tsv, .xlsx or .parquet, or in text on standard input (-).
     """
-    from gough.commands import show
+    from gough.commands import as_json, show
+    from gough.commands.given import pose_given
     from gough.files import inverse_file
     from gough.platform import Platform
 
+    given = pose_given(poses)
     machine = Platform.load(platform)
     with show.progress_bar() as progress:
         report = inverse_file(
-            poses, out, machine, progress=progress, head=0 if out else head,
+            given, out, machine, progress=progress, head=0 if out else head,
             reading=reading_options(
                 platform, keep, keep_bad_rows, ignore_platform, block_rows, log
             ),
         )  # fmt: skip
-    return show.print_report(report, machine, poses, out, head, show.print_legs, allow_failures)
+    if json:
+        rows = as_json.first_legs(report)
+        as_json.print_json(as_json.report_facts(report, machine, rows), out)
+        return show.exit_code(report, allow_failures)
+    return show.print_report(report, machine, given, out, head, show.print_legs, allow_failures)

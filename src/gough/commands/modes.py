@@ -6,17 +6,15 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional, arg
-
-from gough.commands.options import PlatformName
+from gough.commands.given import Legs, readings_given
+from gough.commands.options import Json, PlatformName, option
 
 if TYPE_CHECKING:
-    from gough.checks import Array
+    import pyarrow as pa
+
     from gough.modes.assembly import AssemblyModes
     from gough.modes.choose import Choice
-    from gough.platform import Platform
 
-Legs = Annotated[Positional[tuple[str, ...]], arg(metavar="LEGS")]
 ROWS_PRINTED = 3  # sets of readings whose tables are printed
 
 
@@ -24,9 +22,10 @@ def run(
     legs: Legs = (),
     *,
     platform: PlatformName,
-    out: Annotated[str | None, arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")] = None,
-    plot: Annotated[str | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    workers: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    out: Annotated[str | None, option(metavar="OUT", aliases=["-o"])] = None,
+    json: Json = False,
+    plot: Annotated[str | None, option(metavar="FILE")] = None,
+    workers: Annotated[int | None, option(metavar="N")] = None,
 ) -> int:
     """Find every pose that leg readings allow, and certify each.
 
@@ -37,23 +36,26 @@ def run(
     Exit code 0: every list of poses is complete; 1: one may not be, or is invalid.
 
     Args:
-        legs: six readings, or a .csv or .parquet file with columns leg_1 to leg_6; without
-            them, those of the home pose.
-        out: file to write, .csv or .parquet, one row for each pose; or - for CSV on standard
-            output.
-        plot: .png, .svg or .pdf to draw all poses of the first set of readings in.
-        workers: number of threads; all cores unless given.
+        legs: Find the poses of these six readings, or of every row of readings in this file;
+            without it those of the readings at home.
+        out: Write a row for each pose to this file, .csv or .parquet, or as CSV to standard
+            output (-).
+        plot: Draw all poses of the first set of readings into this file, .png, .svg or .pdf.
+        workers: Use this many threads; without it all cores.
     """
-    from gough.commands import show
+    from gough.commands import as_json, show
     from gough.modes.assembly import assembly_modes
     from gough.modes.choose import choose_mode
     from gough.platform import Platform
 
     machine = Platform.load(platform)
     draw = None if plot is None else _painter(plot)
-    modes = assembly_modes(machine, readings(legs, machine, platform), workers=workers)
+    modes = assembly_modes(machine, readings_given(legs, machine, platform), workers=workers)
     choice = choose_mode(modes)
-    _print(modes, choice, show.console_beside(out))
+    if json:
+        as_json.print_json(_facts(modes, choice), out)
+    else:
+        _print(modes, choice, show.console_beside(out))
     if out is not None:
         _write(out, modes, choice)
     if draw is not None:
@@ -68,42 +70,6 @@ def _painter(path: str) -> Callable[[AssemblyModes], None]:
 
     check_picture(path)
     return lambda modes: save(modes_figure(modes), path)
-
-
-def readings(legs: tuple[str, ...], platform: Platform, name: str) -> Array:
-    """Six numbers (6,), those in a file (N, 6), or those at home if nothing is given.
-
-    Raises:
-        InputError: neither six numbers nor a file that can be read.
-    """
-    from gough.commands.options import FILE_ENDINGS, reading_options
-
-    if not legs:
-        return platform.home_legs
-    if len(legs) == 1 and legs[0].lower().endswith(FILE_ENDINGS):
-        from gough.files import read_legs
-
-        return read_legs(legs[0], platform, reading_options(name))
-    return six_numbers("LEGS", legs, "readings or a .csv or .parquet file")
-
-
-def six_numbers(name: str, values: tuple[str, ...], expected: str) -> Array:
-    """Six numbers from the command line, (6,).
-
-    Raises:
-        InputError: there are not six, or one is no number.
-    """
-    import numpy as np
-
-    from gough.errors import InputError
-
-    try:
-        numbers = np.array([float(v) for v in values])
-    except ValueError as error:
-        raise InputError(f"{name}: {error}; expected six {expected}") from None
-    if len(numbers) != 6:
-        raise InputError(f"{name}: expected six {expected}, found {len(numbers)}")
-    return numbers
 
 
 def _print(modes: AssemblyModes, choice: Choice, screen: Any) -> None:
@@ -188,14 +154,43 @@ def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
 
 def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
     """One row for each pose, the best of its set of readings first."""
+    from gough.files import write_table
+
+    write_table(path, _columns(modes, choice), modes.platform)
+
+
+def _columns(modes: AssemblyModes, choice: Choice) -> dict[str, pa.Array]:
+    """Columns of all poses; sets of readings and poses of a set are numbered from 1."""
     import numpy as np
 
-    from gough.files import write_table
     from gough.modes.result import mode_columns
     from gough.tables import number_column
 
-    columns = mode_columns(modes, None)
-    columns = {"row": columns.pop("row"), "pose": number_column(choice.rank + 1)} | columns
+    numbers = {"row": number_column(modes.row + 1), "pose": number_column(choice.rank + 1)}
+    columns = numbers | {n: c for n, c in mode_columns(modes, None).items() if n != "row"}
     columns |= {f"passes_{name}": number_column(passed) for name, passed in choice.passes.items()}
     order = number_column(np.lexsort((choice.rank, modes.row)))
-    write_table(path, {name: c.take(order) for name, c in columns.items()}, modes.platform)
+    return {name: column.take(order) for name, column in columns.items()}
+
+
+def _facts(modes: AssemblyModes, choice: Choice) -> dict:
+    """The answer for JSON: the sets of readings, and the columns of a file as rows."""
+    import numpy as np
+    import pyarrow as pa
+
+    from gough.status import ModesStatus
+
+    rows = pa.table(_columns(modes, choice)).to_pylist()
+    legs, complete = modes.legs.reshape(-1, 6), np.ravel(modes.complete)
+    sets = [
+        {
+            "row": k + 1,
+            "readings": legs[k],
+            "status": ModesStatus(int(np.ravel(modes.status)[k])).label,
+            "complete": complete[k],
+            "fit": np.ravel(choice.count)[k],
+            "poses": [row for row in rows if row["row"] == k + 1],
+        }
+        for k in range(len(legs))
+    ]
+    return {"platform": modes.platform.name, "unit": modes.platform.unit, "sets": sets}

@@ -57,6 +57,8 @@ IgnorePlatform = Annotated[
 AllowFailures = Annotated[bool, option("Exit with 0 even if some rows have no usable result.")]
 Head = Annotated[int, arg(metavar="N", help="Print this many rows where no file is written.")]
 BlockRows = Annotated[int, arg(metavar="N", help="Hold this many rows in memory at a time.")]
+Json = Annotated[bool, option("Print the answer as JSON on standard output instead of text.")]
+RandomSeed = Annotated[int, arg(metavar="N", help="Draw from this seed of the random numbers.")]
 WorkspaceBox = Annotated[
     tuple[float, float] | None,
     option(

@@ -28,13 +28,13 @@ def run(
         Path, arg(aliases=["-o"], metavar="FOLDER", help="Write the study to this folder.")
     ] = Path("gough-paper"),
     networks: Annotated[Path | None, option(metavar="FOLDER")] = None,
-    quick: bool = False,
+    quick: Annotated[bool, option()] = False,
     budget: Annotated[str | None, option(metavar="TIME")] = None,
     stage: Annotated[
         UseAppendAction[tuple[Stage, ...]],
         option(metavar="STAGE..."),
     ] = (),
-    resume: bool = False,
+    resume: Annotated[bool, option()] = False,
 ) -> int:
     """Run the DisGNet paper's experiments again: networks, tables, figures, report.
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional
+
+from gough.commands.options import Json, option
 
 if TYPE_CHECKING:
     from gough.platform import Platform
 
 
-def run(name: Annotated[Positional[str], arg(metavar="[NAME]", help_behavior_hint="")] = "") -> int:
+def run(
+    name: Annotated[Positional[str], option(metavar="[NAME]")] = "", *, json: Json = False
+) -> int:
     """List the machines that come with gough, or print one as TOML to copy and edit.
 
     gough platforms rubin_camera > mine.toml
@@ -22,7 +26,13 @@ def run(name: Annotated[Positional[str], arg(metavar="[NAME]", help_behavior_hin
     from gough.platform import Platform
     from gough.platform_file import catalog_names, catalog_text
 
-    if name.endswith(".toml"):
+    if json:
+        from gough.commands import as_json
+
+        names = [name] if name else catalog_names()
+        facts = [Platform.load(one).to_dict() for one in names]
+        as_json.print_json(facts[0] if name else dict(zip(names, facts, strict=True)))
+    elif name.endswith(".toml"):
         sys.stdout.write(Platform.load(name).to_toml())
     elif name:
         sys.stdout.write(catalog_text(name))

@@ -8,37 +8,33 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
-from gough.commands.modes import Legs, readings, six_numbers
-from gough.commands.options import BlockRows, IgnorePlatform, KeepBadRows, PlatformName
+from gough.commands.given import Legs, PoseNumbers
+from gough.commands.options import BlockRows, IgnorePlatform, KeepBadRows, PlatformName, option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gough.files.rows import Source
     from gough.platform import Platform
-    from gough.pose import Pose
 
 Picture = Annotated[
     str | None,
-    arg(
+    option(
+        "Write to this file, .svg, .png or .pdf; without it to a new PLATFORM_FIGURE.svg in this "
+        "folder.",
+        "OUT",
         aliases=["-o"],
-        metavar="OUT",
-        help=".svg, .png or .pdf to write; without it a new PLATFORM_FIGURE.svg in this folder.",
-        help_behavior_hint="",
     ),
 ]
 Coordinate = Literal["x", "y", "z", "rx", "ry", "rz"]
-Value = Annotated[float | None, arg(metavar="V", help_behavior_hint="")]
+Value = Annotated[float | None, option(metavar="V")]
 
 
 def pose(
-    pose: Annotated[Positional[tuple[str, ...]], arg(metavar="POSE")] = (),
+    legs: Legs = (),
     *,
     platform: PlatformName,
-    legs: Annotated[
-        tuple[str, str, str, str, str, str] | None,
-        arg(metavar="LEGS", help_behavior_hint=""),
-    ] = None,
+    pose: PoseNumbers = None,
     row: Annotated[int, arg(metavar="N")] = 1,
     out: Picture = None,
 ) -> int:
@@ -46,42 +42,56 @@ def pose(
 
     gough plot pose -p rubin_camera
 
-    gough plot pose 20 -10 610 5 3 -4 -p reference -o pose.svg
+    gough plot pose --pose 20 -10 610 5 3 -4 -p reference -o pose.svg
 
     gough plot pose poses.parquet --row 17 -p reference
 
     Args:
-        pose: x y z in the platform's unit and rx ry rz in degrees (R = Rx Ry Rz), or a .csv or
-            .parquet file of poses or leg readings; without it, and without --legs, home.
-        legs: solve six readings and draw their pose.
-        row: number of the row in the file, from 1.
+        legs: Draw the pose of these six readings, or of a row of this file of poses or readings;
+            without it and without --pose, home.
+        row: Take the row of this number in the file, from 1.
     """
+    from gough.commands.given import row_given
+    from gough.commands.options import reading_options
     from gough.plot.pose import pose_figure
 
     machine = _machine(platform, out, "pose")
-    found = _pose(machine, pose, legs, row)
+    given = row_given(legs, pose, machine, row, reading_options(platform))
+    if given is not None and len(legs) > 1:
+        print(f"{given.outcomes[0].label}: {given.outcomes[0].text}")
+    found = machine.home if given is None else given.pose[0]
     translation, rotation = found.distance(machine.home)
     away = translation > 1e-9 * machine.size or rotation > 1e-9
     ghost = machine.home if away else None
     return _save(pose_figure(machine, found, ghost=ghost), machine, out, "pose")
 
 
-def modes(legs: Legs = (), *, platform: PlatformName, out: Picture = None) -> int:
+def modes(
+    legs: Legs = (),
+    *,
+    platform: PlatformName,
+    row: Annotated[int, arg(metavar="N")] = 1,
+    out: Picture = None,
+) -> int:
     """Draw all poses that have six leg readings; see gough modes.
 
     gough plot modes -p dietmaier -o modes.svg
 
     Args:
-        legs: six readings, or a .csv or .parquet file, of which the first row is used; without
-            them, those of the home pose.
+        legs: Draw the poses of these six readings, or of a row of this file; without it those of
+            the readings at home.
+        row: Take the row of this number in the file, from 1.
     """
+    from gough.commands.given import readings_given
+    from gough.errors import InputError
     from gough.modes.assembly import assembly_modes
     from gough.plot.modes import modes_figure
 
     machine = _machine(platform, out, "modes")
-    figure = modes_figure(
-        assembly_modes(machine, readings(legs, machine, platform).reshape(-1, 6)[0])
-    )
+    readings = readings_given(legs, machine, platform).reshape(-1, 6)
+    if not 1 <= row <= len(readings):
+        raise InputError(f"--row {row}: rows are 1 to {len(readings)}")
+    figure = modes_figure(assembly_modes(machine, readings[row - 1]))
     return _save(figure, machine, out, "modes")
 
 
@@ -97,7 +107,7 @@ def workspace(
     rz: Value = None,
     span: Annotated[
         tuple[float, float, float, float] | None,
-        arg(metavar="A1 A2 B1 B2", help_behavior_hint=""),
+        option(metavar="A1 A2 B1 B2"),
     ] = None,
     resolution: Annotated[int, arg(metavar="N")] = 271,
     out: Picture = None,
@@ -111,16 +121,16 @@ def workspace(
     Lengths are in the platform's unit, angles (R = Rx Ry Rz) in degrees.
 
     Args:
-        axes: two of x, y, z, rx, ry, rz.
-        x: fixed value of x, where it is not an axis; without it, that of home.
-        y: fixed value of y, as for x.
-        z: fixed value of z, as for x.
-        rx: fixed value of rx, as for x.
-        ry: fixed value of ry, as for x.
-        rz: fixed value of rz, as for x.
-        span: lowest and highest value of the first, then of the second axis; without it a
-            little more than workspace and stroke allow.
-        resolution: poses along each axis.
+        axes: Vary these two of x, y, z, rx, ry, rz.
+        x: Fix x at this value, where it is not an axis; without it at that of home.
+        y: Fix y, as x.
+        z: Fix z, as x.
+        rx: Fix rx, as x.
+        ry: Fix ry, as x.
+        rz: Fix rz, as x.
+        span: Draw from the lowest to the highest value of the first and of the second axis;
+            without it a little more than workspace and stroke allow.
+        resolution: Take this many poses along each axis.
     """
     from gough.plot.workspace import workspace_figure, workspace_slice
 
@@ -135,7 +145,7 @@ def trajectory(
     file: Annotated[Positional[str], arg(metavar="FILE")],
     *,
     platform: PlatformName,
-    time: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None,
+    time: Annotated[str | None, option(metavar="COLUMN")] = None,
     out: Picture = None,
     seed: Annotated[str, arg(metavar="NAME")] = "auto",
     keep_bad_rows: KeepBadRows = False,
@@ -150,11 +160,11 @@ def trajectory(
     value of many rows replace lines.
 
     Args:
-        file: .csv or .parquet with columns of poses or leg_1 to leg_6, or - for CSV on
-            standard input.
-        time: column on the horizontal axis, in seconds unless its name ends in a unit, as in
-            time_ms; without it, row numbers.
-        seed: first guess for leg readings, as in gough solve.
+        file: Read poses or readings from this file, .csv, .txt, .tsv or .parquet, or from standard
+            input (-).
+        time: Draw over this column, in seconds unless its name ends in a unit, as in time_ms;
+            without it over the numbers of the rows.
+        seed: Start from this first guess, as in gough solve.
     """
     from gough.commands.options import reading_options
     from gough.plot.trajectory import note, read_trajectory, trajectory_figure
@@ -174,11 +184,11 @@ def trajectory(
 
 
 def errors(
-    files: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE")],
+    files: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE ...")],
     *,
     platform: PlatformName,
-    truth: Annotated[str | None, arg(metavar="POSES", help_behavior_hint="")] = None,
-    all_rows: Annotated[bool, arg(help_behavior_hint="")] = False,
+    truth: Annotated[str | None, option(metavar="POSES")] = None,
+    all_rows: Annotated[bool, option()] = False,
     out: Picture = None,
     keep_bad_rows: KeepBadRows = False,
     ignore_platform: IgnorePlatform = False,
@@ -191,9 +201,9 @@ def errors(
     gough plot errors home.csv disgnet.csv -p reference --truth true.csv
 
     Args:
-        files: .csv or .parquet as gough solve writes them, one or several to compare.
-        truth: the true poses, row for row, to compare the files' poses with.
-        all_rows: include rows whose status is not usable, such as first guesses.
+        files: Compare these files, .csv or .parquet as gough solve writes them.
+        truth: Compare their poses with this file of the true poses, row for row.
+        all_rows: Include rows whose status is not usable, such as first guesses.
     """
     from gough.commands.options import reading_options
     from gough.errors import InputError
@@ -230,34 +240,6 @@ FIGURES: dict[str, Callable[..., int]] = {
 
 
 # ---- parts ----------------------------------------------------------------------------
-
-
-def _pose(
-    machine: Platform, given: tuple[str, ...], legs: tuple[str, ...] | None, row: int
-) -> Pose:
-    """Pose that the command line gives."""
-    import numpy as np
-
-    from gough.errors import InputError
-    from gough.fk.solve import solve
-    from gough.plot.pose import read_pose
-    from gough.pose import Pose
-
-    if legs is not None:
-        if given:
-            raise InputError("POSE, --legs: pass one of them, not both")
-        values = six_numbers("--legs", legs, "readings")
-        solution = solve(machine, values)
-        print(f"{solution.status.label}: {solution.status.text}")
-        return solution.pose
-    if not given:
-        return machine.home
-    if len(given) == 1 and (given[0] == "-" or given[0].lower().endswith((".csv", ".parquet"))):
-        return read_pose(given[0], machine, row)
-    values = six_numbers("POSE", given, "numbers x y z rx ry rz, or a .csv or .parquet file")
-    if not np.all(np.isfinite(values)):
-        raise InputError(f"POSE: expected six finite numbers, found {' '.join(given)}")
-    return Pose.from_euler(values[:3], np.radians(values[3:]))
 
 
 def _machine(platform: str, out: str | None, figure: str) -> Platform:

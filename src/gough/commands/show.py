@@ -48,7 +48,7 @@ def plain_table(*heads: str) -> Table:
 def print_report(
     report: Report,
     platform: Platform,
-    path: str,
+    given: object,
     out: str | None,
     head: int,
     print_rows: Callable[[Report, Platform, Console], None],
@@ -62,8 +62,13 @@ def print_report(
     screen = console_beside(out)
     if not out and head:
         print_rows(report, platform, screen)
-    print_invalid(report, path)
+    print_invalid(report, str(given))
     print_summary(report, platform, out, screen)
+    return exit_code(report, allow_failures)
+
+
+def exit_code(report: Report, allow_failures: bool) -> int:
+    """1 if a row has no usable result and `allow_failures` is False, else 0."""
     return 1 if report.failures and not allow_failures else 0
 
 

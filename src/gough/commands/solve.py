@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, arg
 
+from gough.commands.given import Legs
 from gough.commands.options import (
     AllowFailures,
     BlockRows,
     Head,
     IgnorePlatform,
+    Json,
     Keep,
     KeepBadRows,
     LogOptions,
@@ -22,7 +24,7 @@ from gough.commands.options import (
 
 
 def run(
-    legs: Annotated[Positional[str], arg(metavar="LEGS")],
+    legs: Legs = (),
     *,
     platform: PlatformName,
     out: Out = None,
@@ -37,10 +39,13 @@ def run(
     allow_failures: AllowFailures = False,
     ignore_platform: IgnorePlatform = False,
     head: Head = 5,
+    json: Json = False,
     block_rows: BlockRows = 65536,
     log: OmitArgPrefixes[LogOptions] = LogOptions(),  # noqa: B008 - frozen
 ) -> int:
-    """Calculate poses from a file of leg readings.
+    """Calculate poses from leg readings.
+
+    gough solve 652.1 660.3 655.0 648.8 671.2 639.9 -p reference
 
     gough solve legs.parquet -p rubin_camera -o poses.parquet
 
@@ -49,8 +54,8 @@ def run(
     Exit code 0: all poses are usable; 1: some are not; 2: nothing was written.
 
     Args:
-        legs: Read the columns of the six legs from this file, .csv, .txt, .tsv or .parquet, or
-            from standard input (-).
+        legs: Solve these six readings, or the columns of the six legs in this file, .csv, .txt,
+            .tsv, .xlsx or .parquet, or in text on standard input (-).
         seed: Start from this first guess: home, polynomial, polynomial-5 (another degree), the
             name of a network that comes with gough, or the folder of a trained one. auto is
             polynomial where the platform states a workspace, else home.
@@ -60,21 +65,28 @@ def run(
             guess.
         workers: Use this many threads; without it all cores.
         leg_noise: Add the standard deviations of the pose that readings with this standard
-            deviation (in their unit) cause.
-        angles: Write Euler angles, R = Rx Ry Rz, instead of quaternions.
+            deviation (in their unit) cause; those of rotations are in the unit of --angles, else
+            in radians.
+        angles: Write Euler angles, R = Rx Ry Rz, in this unit instead of quaternions.
     """
-    from gough.commands import show
+    from gough.commands import as_json, show
+    from gough.commands.given import legs_given
     from gough.files import solve_file
     from gough.platform import Platform
 
+    given = legs_given(legs)
     machine = Platform.load(platform)
     with show.progress_bar() as progress:
         report = solve_file(
-            legs, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
+            given, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
             reading=reading_options(
                 platform, keep, keep_bad_rows, ignore_platform, block_rows, log
             ),
             head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
             workers=workers,
         )  # fmt: skip
-    return show.print_report(report, machine, legs, out, head, show.print_poses, allow_failures)
+    if json:
+        poses = as_json.first_poses(report, angles)
+        as_json.print_json(as_json.report_facts(report, machine, poses), out)
+        return show.exit_code(report, allow_failures)
+    return show.print_report(report, machine, given, out, head, show.print_poses, allow_failures)

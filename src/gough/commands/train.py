@@ -18,7 +18,13 @@ from gough.commands.options import PlatformName, WorkspaceBox, option
 from gough.commands.signals import SIGNALS, Stopped
 from gough.learn.config import PRESETS
 
-Preset = tyro.extras.subcommand_type_from_defaults(PRESETS, prefix_names=False)
+ABOUT = {
+    "default": "A residual network with a graph of the joints; ten minutes.",
+    "disgnet": "The paper's network, trained by our recipe; 30 minutes.",
+    "wide": "For wide workspaces: poses reached without crossing a singularity; 15 minutes.",
+    "paper": "The paper's own network, recipe and 400,000 fixed samples; hours.",
+}
+Preset = tyro.extras.subcommand_type_from_defaults(PRESETS, ABOUT, prefix_names=False)
 
 
 def run(
@@ -27,13 +33,13 @@ def run(
     out: Annotated[
         Path, arg(aliases=["-o"], metavar="FOLDER", help="Write the run to this folder.")
     ] = Path("runs/mine"),
-    resume: bool = False,
-    prepare: bool = False,
+    resume: Annotated[bool, option()] = False,
+    prepare: Annotated[bool, option()] = False,
     start: Annotated[Path | None, option(metavar="FOLDER")] = None,
     from_: Annotated[str | None, option(name="from", metavar="NAME")] = None,
     budget: Annotated[str | None, option(metavar="TIME")] = None,
     steps: Annotated[int | None, option(metavar="N")] = None,
-    seed: Annotated[int | None, option(metavar="SEED")] = None,
+    random_seed: Annotated[int | None, option(metavar="N")] = None,
     device: Annotated[str | None, option(metavar="DEVICE")] = None,
     workspace: WorkspaceBox = None,
     preset: Annotated[Preset, arg(name="")] = PRESETS["default"],  # pyright: ignore[reportInvalidTypeForm]
@@ -44,14 +50,12 @@ def run(
 
     gough solve legs.csv -p my.toml --seed runs/mine
 
-    Presets: default; disgnet, the paper's network, 30 minutes; wide, for wide workspaces, only
-    poses reached without crossing a singularity; paper, the paper's own recipe, hours.
+    gough train -p my.toml --from universal -o runs/mine
 
-    Options of the network and its training follow the preset's name:
+    Options of the network and its training follow the name of a preset; gough train default --help
+    lists them:
 
     gough train -p my.toml default --optimiser.lr 1e-3
-
-    gough train -p my.toml --from universal -o runs/mine
 
     Ctrl-C writes a checkpoint; --resume goes on from there.
 
@@ -63,14 +67,14 @@ def run(
             for this platform, for one minute of processor time unless a budget is given.
         budget: Train for this time, such as 90s, 30m or 2h; the preset's unless given.
         steps: Train for this many steps instead of a time; such a run repeats bit for bit.
-        seed: Draw the first weights and the samples from this seed.
+        random_seed: Draw the first weights and the samples from this seed of the random numbers.
         device: Train on cpu, cuda or cuda:1; on a GPU if there is one unless given.
     """
     from gough.learn import train as loop
     from gough.learn.run_folder import duration
     from gough.platform import Platform
 
-    changes = {"budget": budget, "steps": steps, "seed": seed, "device": device}
+    changes = {"budget": budget, "steps": steps, "seed": random_seed, "device": device}
     config = preset.with_run(**{k: v for k, v in changes.items() if v is not None})
     machine = Platform.load(platform)
     if workspace is not None:
@@ -78,7 +82,7 @@ def run(
     if from_ is not None:
         from gough.learn.universal.finetune import finetune
 
-        finetune(machine, out, from_, resume=resume, budget=budget, seed=seed or 0)
+        finetune(machine, out, from_, resume=resume, budget=budget, seed=random_seed or 0)
         print(f"{out}: tuned; use it with: gough solve LEGS -p {platform} --seed {out}")
         return 0
     if prepare:

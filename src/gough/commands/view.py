@@ -8,10 +8,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
+
+from gough.commands.given import Legs, PoseNumbers
+from gough.commands.options import IgnorePlatform, KeepBadRows, PlatformName, option
 
 if TYPE_CHECKING:
     from gough.platform import Platform
+    from gough.pose import Pose
     from gough.view.trajectory import Trajectory
     from gough.view.viewer import Viewer
 
@@ -19,24 +23,24 @@ ROWS = 2000
 
 
 def run(
-    file: Annotated[Positional[str | None], arg(metavar="[FILE]", help_behavior_hint="")] = None,
+    legs: Legs = (),
     *,
-    platform: Annotated[
-        str,
-        arg(aliases=["-p"], metavar="PLATFORM", help="a machine of the catalog, or a .toml file."),
-    ],
-    html: Annotated[str | None, arg(metavar="OUT", help_behavior_hint="")] = None,
+    platform: PlatformName,
+    pose: PoseNumbers = None,
+    html: Annotated[str | None, option(metavar="OUT")] = None,
     host: Annotated[str, arg(metavar="HOST")] = "localhost",
-    port: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    open_browser: Annotated[bool, arg(name="open", help_behavior_hint="")] = False,
+    port: Annotated[int | None, option(metavar="N")] = None,
+    open_browser: Annotated[bool, option(name="open")] = False,
     rows: Annotated[int, arg(metavar="N")] = ROWS,
-    time: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None,
-    keep_bad_rows: Annotated[bool, arg(help_behavior_hint="")] = False,
-    ignore_platform: Annotated[bool, arg(help_behavior_hint="")] = False,
+    time: Annotated[str | None, option(metavar="COLUMN")] = None,
+    keep_bad_rows: KeepBadRows = False,
+    ignore_platform: IgnorePlatform = False,
 ) -> int:
     """Show a machine in the browser, and move it by legs, by pose or by hand.
 
     gough view -p reachy_mini
+
+    gough view 652.1 660.3 655.0 648.8 671.2 639.9 -p reference
 
     gough view poses.parquet -p rubin_camera
 
@@ -47,16 +51,17 @@ def run(
     Exit code of --html: 0: written; 1: written, but a row shown has no pose.
 
     Args:
-        file: play a .csv or .parquet file of poses or leg readings.
-        html: write a page that opens without gough and without a network, and end.
-        host: name or address to listen at; 0.0.0.0 opens the page to the whole network.
-        port: port to listen at; without it the first free one from 8080.
-        open_browser: open the page in this computer's browser.
-        rows: largest number of rows shown, evenly spread over the file.
-        time: column of times [s]; without it 30 rows are played per second.
-        keep_bad_rows: show rows with text in a number column as rows without a pose.
-        ignore_platform: read a file that was written for another platform.
+        legs: Begin with the pose of these six readings, or play this file of poses or readings;
+            without it begin at home.
+        html: Write a page that opens without gough and without a network, and end.
+        host: Listen at this name or address; 0.0.0.0 opens the page to the whole network.
+        port: Listen at this port; without it at the first free one from 8080.
+        open_browser: Open the page in this computer's browser.
+        rows: Show at most this many rows, evenly spread over the file.
+        time: Play by this column of times [s]; without it 30 rows per second.
     """
+    from gough.commands.given import legs_given, row_given
+    from gough.commands.options import reading_options
     from gough.platform import Platform
 
     machine = Platform.load(platform)
@@ -64,35 +69,41 @@ def run(
         from gough.whole_file import check_target
 
         check_target(html)
-    rows_of_file = None
-    if file is not None:
-        from gough.commands.options import reading_options
+    reading = reading_options(platform, "", keep_bad_rows, ignore_platform)
+    played, start = None, None
+    if pose is None and isinstance(file := legs_given(legs) if legs else None, str):
         from gough.view.trajectory import read
 
-        reading = reading_options(platform, "", keep_bad_rows, ignore_platform)
-        rows_of_file = read(file, machine, rows=rows, time=time, reading=reading)
-        print(rows_of_file.about, flush=True)
+        played = read(file, machine, rows=rows, time=time, reading=reading)
+        print(played.about, flush=True)
+    elif given := row_given(legs, pose, machine, reading=reading):
+        start = given.pose[0]
     if html is not None:
-        return _write(html, machine, rows_of_file)
-    return _serve(machine, rows_of_file, host, port, open_browser)
+        return _write(html, machine, played, start)
+    return _serve(machine, played, start, host, port, open_browser)
 
 
-def _write(path: str, platform: Platform, trajectory: Trajectory | None) -> int:
+def _write(path: str, platform: Platform, trajectory: Trajectory | None, start: Pose | None) -> int:
     from gough.view.export import page
     from gough.view.model import Model
     from gough.whole_file import write_whole
 
-    write_whole(path, page(Model(platform), trajectory).encode())
+    write_whole(path, page(Model(platform, start), trajectory).encode())
     print(f"{path}: {Path(path).stat().st_size / 1e6:.1f} MB; opens in any browser, offline")
     return 1 if trajectory is not None and trajectory.failures else 0
 
 
 def _serve(
-    platform: Platform, trajectory: Trajectory | None, host: str, port: int | None, browser: bool
+    platform: Platform,
+    trajectory: Trajectory | None,
+    start: Pose | None,
+    host: str,
+    port: int | None,
+    browser: bool,
 ) -> int:
     from gough.view.viewer import Viewer
 
-    viewer = Viewer(platform, host=host, port=port, trajectory=trajectory)
+    viewer = Viewer(platform, host=host, port=port, trajectory=trajectory, start=start)
     try:
         _announce(viewer, host, port, browser)
         viewer.wait()

@@ -9,12 +9,13 @@ A file name ending in .csv or .parquet gives the format; "-" is CSV on standard 
 from __future__ import annotations
 
 from gough.files.convert import inverse_file, solve_file
-from gough.files.formats import open_source, read_legs, write_table
+from gough.files.formats import GivenRow, open_source, read_legs, write_table
 from gough.files.log_format import LogFormat
 from gough.files.report import Report
 from gough.files.rows import Reading
 
 __all__ = [
+    "GivenRow",
     "LogFormat",
     "Reading",
     "Report",

@@ -22,7 +22,14 @@ from gough.columns import (
     solution_names,
 )
 from gough.errors import GoughError
-from gough.files.formats import STANDARD, file_format, open_sink, open_source
+from gough.files.formats import (
+    STANDARD,
+    Given,
+    GivenRow,
+    file_format,
+    open_sink,
+    open_source,
+)
 from gough.files.log_format import LogFormat
 from gough.files.metadata import describe
 from gough.files.plausible import check_plausible
@@ -40,7 +47,7 @@ Progress = Callable[[Source, Report], None]
 
 
 def solve_file(
-    legs: str | Path,
+    legs: Given,
     out: str | Path | None,
     platform: Platform,
     *,
@@ -56,10 +63,12 @@ def solve_file(
     """Solve a file of leg readings, row for row.
 
     Args:
-        legs: .csv or .parquet with columns leg_1 to leg_6, or "-" for standard input.
+        legs: .csv or .parquet with columns leg_1 to leg_6, "-" for standard input, or a
+            `GivenRow`.
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones, the
             pose, status, residual [platform unit], iterations; with `leg_noise` std_x, std_y,
-            std_z [platform unit], std_rx, std_ry, std_rz [rad]; with `certify` the radius of
+            std_z [platform unit], std_rx, std_ry, std_rz [rad], or std_rx_deg to std_rz_deg with
+            angles "deg"; with `certify` the radius of
             uniqueness [platform unit].
         platform: the machine.
         reading: options for reading the file.
@@ -101,7 +110,7 @@ def solve_file(
 
 
 def inverse_file(
-    poses: str | Path,
+    poses: Given,
     out: str | Path | None,
     platform: Platform,
     *,
@@ -113,7 +122,7 @@ def inverse_file(
 
     Args:
         poses: .csv or .parquet with columns x, y, z and qw, qx, qy, qz, or rx, ry, rz [rad], or
-            rx_deg, ry_deg, rz_deg (R = Rx Ry Rz), or "-" for standard input.
+            rx_deg, ry_deg, rz_deg (R = Rx Ry Rz), "-" for standard input, or a `GivenRow`.
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones,
             leg_1 to leg_6 and status; in text the readings have the form `reading.log`.
         platform, reading, head, progress: as for `solve_file`.
@@ -168,7 +177,7 @@ class _Job:
 
 @contextmanager
 def _open_job(
-    path: str | Path,
+    path: Given,
     out: str | Path | None,
     platform: Platform,
     reading: Reading,
@@ -198,16 +207,15 @@ def _open_job(
         yield _Job(source, blocks, numbers, keep, sink)
 
 
-def _check_paths(path: str | Path, out: str | Path | None) -> None:
+def _check_paths(path: Given, out: str | Path | None) -> None:
     """Raise for a name of no known format, and for an output that is the input."""
     file_format(path, read=True)
     if out is None:
         return
     file_format(out)
-    paths = [Path(path), Path(out)]
-    if STANDARD in map(str, paths) or not all(p.exists() for p in paths):
+    if isinstance(path, GivenRow) or STANDARD in (str(path), str(out)):
         return
-    if paths[0].samefile(paths[1]):
+    if Path(path).exists() and Path(out).exists() and Path(path).samefile(out):
         raise GoughError(f"{out}: is the input itself, which would be lost; write to another name")
 
 

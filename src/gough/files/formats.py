@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -31,7 +33,33 @@ TEXT = (".txt", ".tsv", ".dat", ".log", ".gz")  # read as CSV
 log = logging.getLogger("gough")
 
 
-def file_format(path: str | Path, *, read: bool = False) -> str:
+@dataclass(frozen=True)
+class GivenRow:
+    """Numbers of a command line, to be read as a text file with one row is.
+
+    Attributes:
+        where: name for messages.
+        names: of the columns.
+        values: the numbers as text.
+    """
+
+    where: str
+    names: tuple[str, ...]
+    values: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return self.where
+
+    def open(self, log: LogFormat) -> CsvSource:
+        """The row as a file; `log` names no columns here."""
+        text = "\t".join(self.names) + "\n" + "\t".join(self.values) + "\n"
+        return CsvSource(io.BytesIO(text.encode()), self.where, None, log)
+
+
+Given = str | Path | GivenRow  # what rows are read from
+
+
+def file_format(path: Given, *, read: bool = False) -> str:
     """The format that a name stands for, ".csv" or ".parquet".
 
     Args:
@@ -41,8 +69,8 @@ def file_format(path: str | Path, *, read: bool = False) -> str:
     Raises:
         GoughError: another ending.
     """
-    ending = Path(path).suffix.lower()
-    if str(path) == STANDARD or (read and ending in TEXT):
+    ending = Path(str(path)).suffix.lower()
+    if isinstance(path, GivenRow) or str(path) == STANDARD or (read and ending in TEXT):
         return ".csv"
     if ending not in FORMATS:
         text = f" (or {', '.join(TEXT)} for text)" if read else ""
@@ -54,7 +82,7 @@ def file_format(path: str | Path, *, read: bool = False) -> str:
 
 
 def open_source(
-    path: str | Path,
+    path: Given,
     platform: Platform | None = None,
     reading: Reading = Reading(),  # noqa: B008 - frozen
 ) -> Source:
@@ -64,7 +92,7 @@ def open_source(
     and their readings are converted to the platform's unit.
 
     Args:
-        path: .csv, another text file, or .parquet, or "-".
+        path: .csv, another text file, or .parquet, or "-", or numbers.
         platform: the machine whose readings or poses these are.
         reading: options for reading the file.
 
@@ -72,6 +100,8 @@ def open_source(
         GoughError: a name of no known format.
         InputError: no such file, one that cannot be read, or one of another platform.
     """
+    if isinstance(path, GivenRow):  # its columns are named, whatever those of logs are
+        reading = replace(reading, log=replace(reading.log, columns=()))
     source = _open(path, reading)
     if platform is None:
         return source
@@ -125,7 +155,9 @@ def _name_legs(source: Source, platform: Platform, form: LogFormat) -> list[str]
     return notes
 
 
-def _open(path: str | Path, reading: Reading) -> Source:
+def _open(path: Given, reading: Reading) -> Source:
+    if isinstance(path, GivenRow):
+        return path.open(reading.log)
     ending = file_format(path, read=True)
     if str(path) == STANDARD:
         return CsvSource(sys.stdin.buffer, "standard input", None, reading.log)
@@ -188,7 +220,7 @@ def _standard_output() -> Iterator[BinaryIO]:
 
 
 def read_legs(
-    path: str | Path,
+    path: Given,
     platform: Platform,
     reading: Reading = Reading(),  # noqa: B008 - frozen
 ) -> Array:

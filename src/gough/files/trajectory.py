@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +20,8 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.columns import LEGS, STATUS, checked, pose_or_leg_columns
-from gough.files.formats import open_source
+from gough.errors import InputError
+from gough.files.formats import Given, open_source
 from gough.files.plausible import check_plausible
 from gough.files.rows import Block, Reading, Source
 from gough.kinematics import leg_lengths
@@ -142,7 +142,7 @@ class TrajectoryFile:
 
 @contextmanager
 def open_trajectory(
-    path: str | Path,
+    path: Given,
     platform: Platform,
     *,
     time: str | None = None,
@@ -152,7 +152,7 @@ def open_trajectory(
     """Open a file of poses or of leg readings.
 
     Args:
-        path: .csv or .parquet, or "-" for standard input.
+        path: .csv or .parquet, "-" for standard input, or a `GivenRow`.
         platform: the machine.
         time: name of a column of times.
         seed: first guess for leg readings, as for `gough.solve`.
@@ -167,6 +167,42 @@ def open_trajectory(
         if time is not None:
             checked(source.where, source.columns, (time,))
         yield TrajectoryFile(source, platform, columns, time, seed, reading)
+
+
+def read_row(
+    path: Given,
+    platform: Platform,
+    row: int = 1,
+    *,
+    seed: str = "auto",
+    reading: Reading = Reading(),  # noqa: B008 - frozen
+) -> Trajectory:
+    """Read the pose in one row of a file of poses, or solve one row of leg readings.
+
+    Args:
+        path, platform, seed, reading: as for `open_trajectory`.
+        row: number of the row, from 1.
+
+    Returns:
+        One row, which has a pose.
+
+    Raises:
+        InputError: there is no such row, or it has no pose.
+    """
+    seen = 0
+    with open_trajectory(path, platform, seed=seed, reading=reading) as file:
+        for rows in file.blocks():
+            seen += len(rows)
+            chosen = rows[rows[:, 0] == row]
+            if len(chosen):
+                found = file.solve(chosen)
+                if not np.all(np.isfinite(found.pose.position)):
+                    status = found.outcomes[0]
+                    raise InputError(
+                        f"{path}: row {row} has no pose: {status.label}: {status.text}"
+                    )
+                return found
+    raise InputError(f"{path}: there is no row {row}: rows are 1 to {seen}")
 
 
 def read_columns(

@@ -72,7 +72,8 @@ class Solution:
 
         x, y, z [platform unit], qw, qx, qy, qz, status (a word), residual [platform unit],
         iterations; with a covariance the standard deviations std_x, std_y, std_z [platform
-        unit], std_rx, std_ry, std_rz [rad]; with certificates radius [platform unit].
+        unit], std_rx, std_ry, std_rz [rad], or std_rx_deg to std_rz_deg [deg] if the angles are in
+        degrees; with certificates radius [platform unit].
 
         Args:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
@@ -127,7 +128,10 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
     numbers += [np.ravel(solution.residual), np.ravel(solution.iterations)]
     if solution.covariance is not None:
         variances = np.diagonal(solution.covariance, axis1=-2, axis2=-1)
-        numbers += list(np.sqrt(variances).reshape(-1, 6).T)
+        deviations = np.sqrt(variances).reshape(-1, 6)
+        if angles == "deg":
+            deviations[:, 3:] = np.degrees(deviations[:, 3:])
+        numbers += list(deviations.T)
     if solution.radius is not None:
         numbers.append(np.ravel(solution.radius))
     columns = [number_column(values) for values in numbers]

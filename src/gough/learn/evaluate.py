@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
@@ -130,11 +129,6 @@ def median_time(work: Callable[[], object], repeats: int) -> float:
         work()
         times.append(time.perf_counter() - began)
     return float(np.median(times))
-
-
-def to_json(rows: Sequence[Row]) -> str:
-    """All numbers of the rows, as JSON."""
-    return json.dumps([asdict(row) for row in rows], indent=2) + "\n"
 
 
 def train_peers(platform: Platform, folder: Path, budget: str, *, seed: int = 0,

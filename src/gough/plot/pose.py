@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,6 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from gough.checks import Array
-from gough.errors import InputError
-from gough.files.trajectory import open_trajectory
 from gough.kinematics import assembly_sign, singularity_distance
 from gough.platform import Platform
 from gough.plot.style import (
@@ -172,31 +169,6 @@ def pose_figure(
     _draw_readings(figure.add_subplot(right), platform, bones)
     _legend(figure, bones, ghost is not None)
     return figure
-
-
-def read_pose(path: str | Path, platform: Platform, row: int, seed: str = "auto") -> Pose:
-    """Read the pose in one row of a file of poses, or solve one row of leg readings.
-
-    Args:
-        path: .csv or .parquet.
-        platform: the machine.
-        row: number of the row, from 1.
-        seed: first guess for leg readings, as for `gough.solve`.
-
-    Raises:
-        InputError: there is no such row, or it has no pose.
-    """
-    seen = 0
-    with open_trajectory(path, platform, seed=seed) as file:
-        for rows in file.blocks():
-            seen += len(rows)
-            chosen = rows[rows[:, 0] == row]
-            if len(chosen):
-                pose = file.solve(chosen).pose[0]
-                if not np.all(np.isfinite(pose.position)):
-                    raise InputError(f"{path}: row {row} has no pose that could be drawn")
-                return pose
-    raise InputError(f"{path}: there is no row {row}: rows are 1 to {seen}")
 
 
 # ---- parts ----------------------------------------------------------------------------

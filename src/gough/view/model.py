@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gough.checks import Array
+from gough.errors import GoughError
 from gough.kinematics import leg_lengths, singularity_distance, strut_vectors
 from gough.limit_rules import in_workspace
 from gough.platform import Platform
@@ -59,11 +60,20 @@ class Model:
         answer: its result.
     """
 
-    def __init__(self, platform: Platform) -> None:
+    def __init__(self, platform: Platform, start: Pose | None = None) -> None:
+        """Show the machine at `start`, or at home.
+
+        Raises:
+            GoughError: the legs cannot have the pose `start`.
+        """
         self.platform = platform
         self._home_distance = float(singularity_distance(platform, platform.home))
         self._earlier: deque[tuple[Pose, Array, Array]] = deque(maxlen=UNDO_STEPS)
         self.home()
+        if start is not None:
+            self.ask_pose(start)
+            if not self.answer.reached:
+                raise GoughError(self.answer.text.removesuffix(UNCHANGED).strip())
 
     # ---- requests ---------------------------------------------------------------------
 

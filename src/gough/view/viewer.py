@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gough.platform import Platform
+from gough.pose import Pose
 from gough.view.export import page
 from gough.view.model import Model
 from gough.view.panel import FIND, Panel
@@ -70,14 +71,15 @@ class Viewer:
         host: str = "localhost",
         port: int | None = None,
         trajectory: Trajectory | None = None,
+        start: Pose | None = None,
     ) -> None:
-        """Draw the machine at home, and compile the solver in the background.
+        """Draw the machine at `start` or at home, and compile the solver in the background.
 
         Raises:
             GoughError: the port is taken.
         """
         self.platform, self.trajectory = platform, trajectory
-        self.model = Model(platform)
+        self.model = Model(platform, start)
         self.server = open_server(host, port, f"gough · {platform.name}")
         self._requests = RequestQueue()
         self.scene = Scene(self.server, platform)
