@@ -96,16 +96,16 @@ def run(
 
         write_report(calibration, report)
         lines.append(f"wrote {report}")
-    written = out is not None and (calibration.better or force)
-    if written:
-        calibration.platform.save(out)
-        lines.append(f"wrote {out}")
+    written = out if calibration.better or force else None
+    if written is not None:
+        calibration.platform.save(written)
+        lines.append(f"wrote {written}")
     elif out is not None:
         lines.append(f"{out} was not written: the drawing may be better; --force writes it")
     if json:
         from gough.commands import as_json
 
-        as_json.print_json(_facts(calibration) | {"written": out if written else None})
+        as_json.print_json(_facts(calibration) | {"written": written})
     else:
         print("\n".join(lines))
     return 0 if written or (out is None and calibration.better) else 1
