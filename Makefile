@@ -59,7 +59,7 @@ $(VENV)/.core: pyproject.toml | $(BIN)/python
 
 $(VENV)/.dev: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing the development environment into $(VENV), a few minutes ..."
-	@$(PIP) -c constraints.txt -e '.[dev,learn,plot,view]'
+	@$(PIP) -c constraints.txt -e '.[dev,excel,learn,plot,view]'
 	@touch $@ $(VENV)/.core
 
 $(VENV)/.docs: pyproject.toml constraints.txt | $(BIN)/python

@@ -16,7 +16,7 @@ from gough.errors import GoughError, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
 Functions = Callable[..., int] | dict[str, Callable[..., int]]  # dict: a family of commands
-EXTRAS = {"matplotlib": "plot", "viser": "view"} | dict.fromkeys(
+EXTRAS = {"matplotlib": "plot", "viser": "view", "python_calamine": "excel"} | dict.fromkeys(
     ("torch", "roma", "safetensors", "onnx", "onnxscript", "scipy", "tensorboard"), "learn"
 )
 

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import xlsxwriter
 from logs import make
 
 from gough.columns import LEGS
@@ -148,3 +149,29 @@ def test_date_and_time_are_seconds(tmp_path):
         pytest.raises(InputError, match="line 2: column t: found '10:2', expected a number or"),
     ):
         next(file.blocks())
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"leg_1,leg_2\n", None])
+def test_files_that_are_no_workbook_are_refused(tmp_path, content):
+    path = tmp_path / "log.xlsx"
+    path.write_bytes(
+        (make.FOLDER / "sheet.xlsx").read_bytes()[:3000] if content is None else content
+    )
+    with pytest.raises(InputError, match="is damaged or no Excel file") as error:
+        read_legs(path, make.press())
+    assert "\n" not in str(error.value)
+
+
+def test_a_workbook_without_cells_is_empty(tmp_path):
+    path = tmp_path / "log.xlsx"
+    with xlsxwriter.Workbook(path) as book:
+        book.add_worksheet()
+    with pytest.raises(InputError, match="has no sheet with cells"):
+        read_legs(path, make.press())
+
+
+def test_times_of_a_sheet_are_read():
+    path = make.FOLDER / "sheet.xlsx"
+    with open_trajectory(path, make.press(), time="time") as file:
+        time = np.concatenate([rows[:, 1] for rows in file.blocks()])
+    np.testing.assert_allclose(np.diff(time), 0.02, atol=1e-6)

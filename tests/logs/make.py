@@ -9,11 +9,14 @@ motors, in radians), at eight poses; `tests/files/test_logs.py` reads every log 
 from __future__ import annotations
 
 import gzip
+import io
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import xlsxwriter
 
 import gough
 
@@ -117,6 +120,26 @@ def stamped(readings: np.ndarray) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
+def sheet(readings: np.ndarray) -> bytes:
+    """A workbook with notes on one sheet, and preamble, units, dates and an error on the next."""
+    file = io.BytesIO()
+    with xlsxwriter.Workbook(file) as book:
+        book.set_properties({"created": datetime(2026, 11, 24)})
+        book.add_worksheet("Notes").write_column(0, 0, ["Press 6", 'Smith, "J."\nnight shift'])
+        log = book.add_worksheet("Log")
+        log.write_row(0, 1, ["Logger", "DAQ-6"])
+        log.write_row(2, 1, ["time", *numbered("Cylinder {}"), "state"])
+        log.write_row(3, 2, ["mm"] * 6)
+        stamp = book.add_format({"num_format": "yyyy-mm-dd hh:mm:ss.000"})
+        for k, row in enumerate(readings, 4):
+            log.write_datetime(
+                k, 1, datetime(2026, 11, 24, 10) + timedelta(seconds=0.02 * k), stamp
+            )
+            log.write_row(k, 2, [*(INCH * row), "stop" if k == 9 else "run"])
+        log.write(4, 8, "=1/0", None, "#DIV/0!")
+    return file.getvalue()
+
+
 LEFT = ["left front", "right front", "right", "right rear", "left rear", "left"]
 LOGS = {
     "plain.csv": Log(named(LEGS)),
@@ -187,6 +210,7 @@ LOGS = {
         refused="[counts], which cannot be converted to [in]; pass --unit and --scale",
         options={"scale": "1e-4"},
     ),
+    "sheet.xlsx": Log(sheet, said="converted from [mm] to [in]"),
     "motor_degrees.csv": Log(
         named(numbered("motor_{}"), scale=np.pi / 180),
         machine="reachy_mini",

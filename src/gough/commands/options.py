@@ -11,10 +11,6 @@ if TYPE_CHECKING:
     from gough.files import Reading
 
 
-# names of files to read; "-" is standard input
-FILE_ENDINGS = (".csv", ".parquet", ".txt", ".tsv", ".dat", ".log", ".gz", "-")
-
-
 def option(text: str | None = None, metavar: str | None = None, **settings: Any) -> Any:
     """An option without a remark on its default value.
 

@@ -19,6 +19,7 @@ from gough.checks import Array
 from gough.columns import LEGS, POSITION, file_leg_columns
 from gough.errors import GoughError, InputError
 from gough.files.csv import CsvSink, CsvSource
+from gough.files.excel import EXCEL, open_sheet
 from gough.files.log_format import LogFormat, split_unit
 from gough.files.metadata import check_same, describe
 from gough.files.parquet import ParquetSink, ParquetSource
@@ -29,7 +30,7 @@ from gough.whole_file import explain, replacing
 
 STANDARD = "-"  # standard input or output, as CSV
 FORMATS = (".csv", ".parquet")
-TEXT = (".txt", ".tsv", ".dat", ".log", ".gz")  # read as CSV
+TEXT = (".txt", ".tsv", ".dat", ".log", ".gz", *EXCEL)  # read as CSV
 log = logging.getLogger("gough")
 
 
@@ -73,7 +74,7 @@ def file_format(path: Given, *, read: bool = False) -> str:
     if isinstance(path, GivenRow) or str(path) == STANDARD or (read and ending in TEXT):
         return ".csv"
     if ending not in FORMATS:
-        text = f" (or {', '.join(TEXT)} for text)" if read else ""
+        text = f" (or {', '.join(TEXT)} for text and sheets)" if read else ""
         raise GoughError(
             f"{path}: the name must end in .csv or .parquet{text}, or be - for CSV on standard "
             f"{'input' if read else 'output'}"
@@ -170,6 +171,9 @@ def _open(path: Given, reading: Reading) -> Source:
     try:
         if ending == ".parquet":
             return ParquetSource(file, str(path))
+        if Path(path).suffix.lower() in EXCEL:
+            with file:
+                return open_sheet(file, str(path), reading.log)
         size = os.fstat(file.fileno()).st_size
         return CsvSource(file, str(path), size or None, reading.log)
     except BaseException:

@@ -103,7 +103,8 @@ def check_text(where: str, start: bytes) -> None:
     for magic, name in COMPRESSED.items():
         if start.startswith(magic):
             raise InputError(
-                f"{where}: is compressed ({name}); unpack it first, and save a spreadsheet as CSV"
+                f"{where}: is compressed ({name}); unpack it first; a spreadsheet's name must end "
+                "in .xlsx"
             )
     if b"\0" in start:
         raise InputError(f"{where}: holds binary data, not CSV text")
