@@ -24,9 +24,10 @@ import numpy as np
 
 import gough
 from gough.calibration.estimate import Problem, State, minimise
+from gough.calibration.placements import Targets
 from gough.calibration.prediction import Workspace
 from gough.calibration.residuals import Rigid, forward
-from gough.calibration.sensors import PoseSensor, Targets, TargetSensor
+from gough.calibration.sensors import PoseSensor, TargetSensor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "calibration"))
 from machines import LEG, TRACKER, Truth, measure, options, truth

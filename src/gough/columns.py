@@ -13,6 +13,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 EULER = ("rx", "ry", "rz")  # [rad], R = Rx Ry Rz
 EULER_DEG = ("rx_deg", "ry_deg", "rz_deg")
 ROTATIONS = (QUATERNION, EULER, EULER_DEG)
+ROTATION_TEXT = "qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg"
 STATUS, RESIDUAL, ITERATIONS, RADIUS = "status", "residual", "iterations", "radius"
 DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
 Angles = Literal["deg", "rad"]
@@ -51,14 +52,27 @@ def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
         InputError: some are missing or occur twice; the message lists those found.
     """
     missing = [name for name in POSITION if name not in found]
-    rotation = next((r for r in ROTATIONS if all(name in found for name in r)), None)
-    if missing or rotation is None:
-        what = f"column {', '.join(missing)}" if missing else "whole set of rotation columns"
+    if missing:
         raise InputError(
-            f"{where}: no {what}; expected x, y, z and one of qw, qx, qy, qz | rx, ry, rz [rad] | "
-            f"rx_deg, ry_deg, rz_deg; found {_list(found)}; {_rename(missing, found)}"
+            f"{where}: no column {', '.join(missing)}; expected x, y, z and one of "
+            f"{ROTATION_TEXT}; found {_list(found)}; {_rename(missing, found)}"
         )
-    return checked(where, found, (*POSITION, *rotation))
+    return (*checked(where, found, POSITION), *rotation_columns(where, found))
+
+
+def rotation_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
+    """Rotation columns: the first complete set of qw.., rx.., rx_deg.. columns.
+
+    Raises:
+        InputError: none is complete, or a column occurs twice; the message lists those found.
+    """
+    rotation = next((r for r in ROTATIONS if all(name in found for name in r)), None)
+    if rotation is None:
+        raise InputError(
+            f"{where}: no whole set of rotation columns; expected one of {ROTATION_TEXT}; found "
+            f"{_list(found)}; {_rename([], found)}"
+        )
+    return checked(where, found, rotation)
 
 
 def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
@@ -71,8 +85,7 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
     if not has_legs and not any(name in found for name in POSITION):
         raise InputError(
             f"{where}: holds neither legs nor poses; expected columns leg_1 to leg_6, or x, y, z "
-            "and one of qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg; found "
-            f"{_list(found)}"
+            f"and one of {ROTATION_TEXT}; found {_list(found)}"
         )
     try:
         return pose_columns(where, found)

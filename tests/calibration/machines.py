@@ -9,8 +9,8 @@ import numpy as np
 
 from gough import Platform, Pose, leg_lengths
 from gough.calibration.parameters import Parameters
+from gough.calibration.placements import Frames
 from gough.calibration.residuals import Rigid, exp_rotation
-from gough.calibration.sensors import Frames
 
 TRACKER = (0.01, float(np.radians(0.002)))  # [mm], [rad]
 LEG = 0.003  # [mm]

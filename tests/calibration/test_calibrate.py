@@ -121,8 +121,11 @@ def test_a_drift_is_seen_and_taken_out() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "rank", "with_gains"),
-    [("position", 39, 45), ("targets", 42, 48), ("distances", 42, 48), ("inclinometer", 35, 40)],
-)
+    [
+        ("position", 39, 45), ("targets", 42, 48), ("distances", 42, 48),
+        ("one distance", 36, 42), ("orientation", 36, 41), ("inclinometer", 35, 40),
+    ],
+)  # fmt: skip
 def test_partial_instruments_reach_their_rank(kind: str, rank: int, with_gains: int) -> None:
     known = REFERENCE
     pose = known.poses(60, 3)
@@ -135,15 +138,18 @@ def test_partial_instruments_reach_their_rank(kind: str, rank: int, with_gains: 
     rng = np.random.default_rng(1)
     up = np.array([0.01, 0.02, 1]) / np.linalg.norm([0.01, 0.02, 1])
     tilts = np.arcsin((up @ pose.rotation @ exp_rotation(np.array([0.02, 0.01, 0.3])))[:, :2])
+    distances = np.linalg.norm(joints - stations, axis=-1) + rng.normal(0, 0.005, (60, 3))
+    wobble = exp_rotation(rng.normal(0, TRACKER[1], (60, 3)))
+    turned = wobble @ known.seen(pose).R
     measured, sigma = {
         "position": (seen[:, 0] + rng.normal(0, 0.01, (60, 3)), 0.01),
         "targets": (seen + rng.normal(0, 0.01, seen.shape), 0.01),
-        "distances": (
-            np.linalg.norm(joints - stations, axis=-1) + rng.normal(0, 0.005, (60, 3)), 0.005,
-        ),
+        "distances": (distances, 0.005),
+        "one distance": (distances[:, :1], 0.005),
+        "orientation": (Pose.from_rotation(np.zeros((60, 3)), turned), TRACKER[1]),
         "inclinometer": (tilts + rng.normal(0, TRACKER[1], tilts.shape), TRACKER[1]),
     }[kind]  # fmt: skip
-    told = options(known) | {"sigma": sigma, "kind": kind}
+    told = options(known) | {"sigma": sigma, "kind": "distances" if "distance" in kind else kind}
     found = gough.calibrate(known.drawing, legs, measured, **told)
     assert found.rank == rank
     assert found.better
@@ -157,6 +163,8 @@ def test_partial_instruments_reach_their_rank(kind: str, rank: int, with_gains: 
 
 
 MISTAKES = {
+    "angles in radians stand in columns of degrees": lambda legs, pose: (
+        legs, Pose.from_euler(pose.position, np.radians(pose.euler))),
     "the poses are inverse": lambda legs, pose: (legs, pose.inverse()),
     "the rotations are transposed": lambda legs, pose: (
         legs, Pose(pose.position, pose.inverse().wxyz)),
@@ -198,12 +206,31 @@ def test_what_a_person_is_told() -> None:
     holes = LEGS.copy()
     holes[4, 2] = np.nan
     assert (
-        "1 of 40 rows hold NaN and are left out."
+        "1 of 40 rows hold NaN and are left out: row 5."
         in gough.calibrate(drawing, holes, POSES, **told).messages
     )
     blind = gough.calibrate(drawing, LEGS, POSES, **_but(sigma=(50.0, 0.2)))
     assert not blind.better
     assert "not surely better than the drawing" in blind.messages[0]
+
+
+def test_noise_of_each_row_counts() -> None:
+    rng = np.random.default_rng(2)
+    loud = np.arange(40) >= 20
+    position = POSES.position + np.where(loud[:, None], rng.normal(0, 2.0, (40, 3)), 0)
+    sigma = np.where(loud[:, None], [2.0, TRACKER[1]], TRACKER)
+    seen = Pose(position, POSES.wxyz)
+    alike = gough.calibrate(REFERENCE.drawing, LEGS, seen, **_but(sigma=(1.4, TRACKER[1])))
+    each = gough.calibrate(REFERENCE.drawing, LEGS, seen, **_but(sigma=sigma))
+    assert np.mean(_true_errors(REFERENCE, each)) < 0.1 * np.mean(_true_errors(REFERENCE, alike))
+    sigma[3] = np.nan
+    with_hole = gough.calibrate(REFERENCE.drawing, LEGS, seen, **_but(sigma=sigma))
+    assert with_hole.messages[0] == "1 of 40 rows hold NaN and are left out: row 4."
+    sigma[3] = -1
+    with pytest.raises(GoughError, match="sigma, row 4: expected a standard deviation above 0"):
+        gough.calibrate(REFERENCE.drawing, LEGS, seen, **_but(sigma=sigma))
+    with pytest.raises(GoughError, match=r"sigma: expected a pair.* each of the 40 rows"):
+        gough.calibrate(REFERENCE.drawing, LEGS, seen, **_but(sigma=0.01))
 
 
 def test_units_change_nothing() -> None:

@@ -135,12 +135,13 @@ def test_the_examples_outliers_are_named_and_nothing_doubtful_is_written(
         (["--sigma", "0.01"], "--sigma: expected 2 numbers for pose, found 1"),
         (["--sigma", "0.01", "0"], "sigma[1]: expected a standard deviation above 0"),
         (
-            ["--sigma", "0.01", "0.002", "--measured", "targets"],
+            ["--sigma", "0.01", "--measured", "targets"],
             "no whole set of columns",
         ),
         (["--sigma", "0.01", "--measured", "distances"], "distance_1, distance_2"),
         (["--sigma", "0.01", "0.002", "--drift", "t"], "no column 't'"),
         (["--sigma", "0.01", "0.002", "-o", "x.csv"], "must end in .toml"),
+        ([], "no column sigma, sigma_deg; state the standard deviation"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(arguments: list[str], message: str, capsys) -> None:
@@ -161,14 +162,19 @@ def test_other_instruments_come_from_files_too(tmp_path: Path) -> None:
         "targets": (["x_1", "y_1", "z_1", "x_2", "y_2", "z_2"], (3, 2, 3)),
         "position": (["x", "y", "z", "a", "b", "c"], (3, 3)),
         "distances": ([f"distance_{i}" for i in range(1, 7)], (3, 6)),
+        "orientation": (["rx_deg", "ry_deg", "rz_deg", "sigma_deg", "a", "b"], (3, 4)),
         "inclinometer": (["tilt_x_deg", "tilt_y_deg", "a", "b", "c", "t"], (3, 2)),
     }
     found = None
     for kind, (columns, shape) in cases.items():
         file = tmp_path / f"{kind}.csv"
         _write(file, names + columns, rows)
-        found = read_measured(str(file), machine, kind, "t" if "t" in columns else None)
-        assert found.measured.shape == shape
+        sigma = () if "sigma_deg" in columns else (0.01,)
+        found = read_measured(str(file), machine, kind, "t" if "t" in columns else None, sigma)
+        values = found.measured.wxyz if kind == "orientation" else found.measured
+        assert values.shape == shape
+        if kind == "orientation":
+            np.testing.assert_allclose(found.sigma, np.radians(rows[:, 9]))
         np.testing.assert_array_equal(found.legs, rows[:, :6])
         assert json.dumps(found.place(1)) == '"line 3"'
     assert found is not None

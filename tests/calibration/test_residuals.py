@@ -8,15 +8,13 @@ from calibration.machines import truth
 
 from gough import leg_lengths
 from gough.calibration.parameters import Parameters
+from gough.calibration.placements import Bars, Frames, Level, Rotations, Targets
 from gough.calibration.residuals import Rigid, exp_rotation, forward, struts
 from gough.calibration.sensors import (
-    Bars,
     DistanceSensor,
-    Frames,
     InclinometerSensor,
-    Level,
+    OrientationSensor,
     PoseSensor,
-    Targets,
     TargetSensor,
 )
 
@@ -79,6 +77,7 @@ def test_sensitivities_are_derivatives_of_what_is_measured() -> None:
     up = up / np.linalg.norm(up)
     cases = [
         (PoseSensor(X, (1.0, 1.0)), Frames(F, Rigid(turn(), rng.normal(size=3)))),
+        (OrientationSensor(X.R, 1.0), Rotations(F, Rigid(turn(), np.zeros(3)))),
         (TargetSensor(rng.normal(size=(n, 3, 3)), 1.0), Targets(F, rng.normal(size=(3, 3)))),
         (DistanceSensor(rng.normal(size=(n, 2)), 1.0),
          Bars(3 * rng.normal(size=(2, 3)), rng.normal(size=(2, 3)))),

@@ -7,6 +7,7 @@ import numpy as np
 from gough.calibration import identify
 from gough.calibration.estimate import Estimate
 from gough.calibration.result import NOTICEABLE, SURE, Calibration
+from gough.calibration.words import row_numbers
 
 FOUR = 4.0  # tolerances or standard errors beyond which something is called unlikely
 
@@ -24,7 +25,7 @@ def advice(found: Calibration) -> list[str]:
             f"The calibrated machine is not surely better than the drawing: {reason} (wanted: "
             f"{SURE} and {NOTICEABLE:g}). Measure more poses, or with a better instrument."
         )
-    unseen = identify.in_words(found.problem.sensor, found.residuals.shape[1])
+    unseen = identify.in_words(found.problem.sensor)
     if unseen:
         out.append(unseen)
     out += _outliers(found) + _noise(found) + _far_parameters(found)
@@ -35,8 +36,8 @@ def _outliers(found: Calibration) -> list[str]:
     bad = found.rows[~found.inliers]
     if not len(bad):
         return []
-    shown = ", ".join(str(i + 1) for i in bad[:10]) + (", ..." if len(bad) > 10 else "")
-    return [f"{len(bad)} of {len(found.rows)} poses are outliers and left out: rows {shown}."]
+    text = f"{len(bad)} of {len(found.rows)} poses are outliers and left out"
+    return [f"{text}: {row_numbers(bad + 1)}."]
 
 
 def _noise(found: Calibration) -> list[str]:

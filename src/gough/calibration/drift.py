@@ -68,7 +68,7 @@ class DriftProblem(Problem):
         plain = replace(state, place=drift.place)
         rows, moved = self.corrected(drift).rows(plain)
         when = self.when[:, None, None]
-        parts = [rows.place, when * rows.legs[..., OFFSET :: self.parameters.count]]
+        parts = [rows.place, when * rows.by_strut * rows.struts[:, None, :, OFFSET]]
         if len(drift.twist):
             full = rows
             if not self.placed:
@@ -135,5 +135,5 @@ def _moved_back(sensor: Sensor, when: Array, twist: Array) -> Sensor:
     if isinstance(sensor, PoseSensor):
         return replace(sensor, pose=back @ sensor.pose)
     assert isinstance(sensor, TargetSensor)
-    points = sensor.points @ np.swapaxes(back.R, 1, 2) + back.t[:, None]
-    return replace(sensor, points=points)
+    values = sensor.values @ np.swapaxes(back.R, 1, 2) + back.t[:, None]
+    return replace(sensor, values=values)

@@ -68,6 +68,11 @@ class Problem:
     def __len__(self) -> int:
         return len(self.legs)
 
+    @property
+    def numbers(self) -> int:
+        """m, how many numbers the instrument measures in a pose."""
+        return self.sensor.numbers
+
     def __getitem__(self, rows: Any) -> Problem:
         return replace(self, sensor=self.sensor[rows], legs=self.legs[rows])
 
@@ -114,19 +119,34 @@ class Estimate:
     weights: Array
 
 
-def whiten(rows: Rows, extra: Array | None = None) -> tuple[Array, Array]:
+def whiten(rows: Rows, weights: Array | None = None) -> tuple[Array, Array]:
     """Errors (n, m) and derivatives (n, m, P) divided by the square root of the covariance.
 
     Args:
-        extra: (n, m, m) more covariance.
+        weights: (n,) of the poses, by whose square roots the derivatives are multiplied.
     """
-    covariance = rows.covariance if extra is None else rows.covariance + extra
-    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
-    A = np.concatenate([rows.legs, rows.place], axis=-1)
-    white = np.zeros_like(A)
-    for k in range(A.shape[1]):  # a triangle times A, column by column: faster than n products
-        white[:, k:] += inverse[:, k:, k, None] * A[:, None, k]
-    return (inverse @ rows.errors[..., None])[..., 0], white
+    root = inverse_root(rows.covariance)
+    errors = (root @ rows.errors[..., None])[..., 0]
+    if weights is not None:
+        root = root * np.sqrt(weights)[:, None, None]
+    n, m = errors.shape
+    legs = rows.struts.shape[1] * rows.struts.shape[2]
+    A = np.empty((n, m, legs + rows.place.shape[-1]))
+    by_leg = A[..., :legs].reshape(n, m, *rows.struts.shape[1:])  # a view
+    np.multiply((root @ rows.by_strut)[..., None], rows.struts[:, None], out=by_leg)
+    np.matmul(root, rows.place, out=A[..., legs:])
+    return errors, A
+
+
+def inverse_root(covariance: Array) -> Array:
+    """L^-1 (n, m, m) of covariances L L^T."""
+    return np.linalg.inv(np.linalg.cholesky(covariance))
+
+
+def squared_distances(problem: Problem, state: State) -> Array:
+    """Squared Mahalanobis distance (n,) of each pose's errors at an estimate."""
+    rows = problem.rows(state)[0]
+    return np.sum((inverse_root(rows.covariance) @ rows.errors[..., None]) ** 2, axis=(1, 2))
 
 
 class _Normal:
@@ -134,11 +154,10 @@ class _Normal:
 
     def __init__(self, problem: Problem, state: State, weights: Array | None) -> None:
         rows, self.state = problem.rows(state)
-        errors, A = whiten(rows)
+        errors, A = whiten(rows, weights)
         self.distance = np.sum(errors**2, axis=1)
-        root = None if weights is None else np.sqrt(weights)[:, None]
-        if root is not None:
-            errors, A = errors * root, A * root[..., None]
+        if weights is not None:
+            errors = errors * np.sqrt(weights)[:, None]
         parameters = problem.parameters
         gap = ((state.values - parameters.drawn) / parameters.tolerance).ravel()
         flat = A.reshape(-1, A.shape[-1])
@@ -219,14 +238,14 @@ def place_instrument(
         The estimate, and (n,) squared distances of the poses' errors; m on average where the
         drawing is within tolerance.
     """
-    tolerance = problem.parameters.tolerance.ravel()
+    tolerance = problem.parameters.tolerance
     state, cost, damping = start, np.inf, 0.0
     errors, B = np.zeros(0), np.zeros((0, 0))
     best: tuple[State, Array] | None = None
     for _ in range(iterations):
         rows, tried = problem.rows(state)
-        loose = rows.legs * tolerance
-        white, A = whiten(rows, loose @ np.swapaxes(loose, 1, 2))
+        whitening = inverse_root(rows.covariance + rows.covariance_of(tolerance))
+        white = (whitening @ rows.errors[..., None])[..., 0]
         distance = np.sum(white**2, axis=1)
         root = np.ones(len(white)) if weights is None else np.sqrt(weights)
         now = float(np.sum(root**2 * distance))
@@ -235,7 +254,7 @@ def place_instrument(
         if now <= cost * (1 + 1e-9):
             done = cost - now < 1e-6 * now
             cost, best, damping = now, (tried, distance), damping / 10
-            B = (A[..., tolerance.size :] * root[:, None, None]).reshape(white.size, -1)
+            B = ((whitening * root[:, None, None]) @ rows.place).reshape(white.size, -1)
             errors = (white * root[:, None]).ravel()
             if done or not B.shape[1]:
                 break

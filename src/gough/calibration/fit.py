@@ -16,33 +16,20 @@ from gough.calibration.estimate import (
     place_instrument,
     poses_of_readings,
 )
+from gough.calibration.inputs import as_sensor, check_kind, check_sigma, known_place
+from gough.calibration.kinds import Kind
 from gough.calibration.mistakes import FAR, LOOKED_AT, likely_mistake
 from gough.calibration.parameters import Parameters
-from gough.calibration.residuals import Rigid
 from gough.calibration.result import Calibration
 from gough.calibration.robust import find_start, plain_fit, robust_fit
-from gough.calibration.sensors import (
-    KINDS,
-    Bars,
-    DistanceSensor,
-    Frames,
-    InclinometerSensor,
-    Level,
-    PoseSensor,
-    Targets,
-    TargetSensor,
-    check_sigma,
-)
+from gough.calibration.words import row_numbers
 from gough.checks import as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
-from gough.pose import Pose, as_pose
+from gough.pose import Pose
 from gough.tables import Table, as_readings
 
-Kind = Literal["pose", "position", "targets", "distances", "inclinometer"]
-SHAPES = {"position": (3,), "targets": (3,), "distances": (), "inclinometer": (2,)}
 HOPELESS = 20.0  # times noise and tolerance beyond which data without a known mistake are refused
-FOUR = 4.0  # tolerances or standard errors beyond which something is called unlikely
 
 
 def calibrate(
@@ -50,7 +37,7 @@ def calibrate(
     legs: ArrayLike | Table,
     measured: Pose | ArrayLike | Table,
     *,
-    sigma: float | tuple[float, float],
+    sigma: ArrayLike,
     leg_sigma: float,
     tolerance: float,
     kind: Kind = "pose",
@@ -67,20 +54,22 @@ def calibrate(
         platform: the machine as drawn.
         legs: readings (n, 6), or a table with columns leg_1 to leg_6.
         measured: what the instrument measured at these readings, by `kind`: poses (n) or a table
-            of them; positions of one target (n, 3) or of k targets (n, k, 3), k distances (n, k)
-            [platform unit]; or the angles (n, 2) [rad] by which an inclinometer's x and y axes
-            point above the horizontal. Rows with NaN are left out.
-        sigma: standard deviation of what is measured [platform unit], or [rad] for an
-            inclinometer; for poses a pair, of position and of rotation [rad].
+            of them, also for the rotations of an orientation; positions of one target (n, 3) or
+            of k targets (n, k, 3), k distances (n, k) [platform unit]; or the angles (n, 2) [rad]
+            by which an inclinometer's x and y axes point above the horizontal. Rows with NaN are
+            left out.
+        sigma: standard deviation of what is measured [platform unit], or [rad] for orientations
+            and inclinometers; for poses a pair, of position and of rotation [rad]. Stated once,
+            or for each row: (n,) or (n, 2).
         leg_sigma: standard deviation of the readings, in their unit.
         tolerance: standard deviation of joints and lengths from the drawing [platform unit].
-        kind: "pose", "position", "targets", "distances" or "inclinometer".
+        kind: "pose", "position", "orientation", "targets", "distances" or "inclinometer".
         gains: fit a gain of each leg's sensor, too.
         frames: "unknown": where the instrument and what it looks at stand is fitted, too;
             "known": measurements are in base coordinates, of the platform itself.
         robust: find the poses that do not fit, and leave them out.
-        targets: (k, 3) points that are looked at [platform coordinates]; a first guess where
-            frames are unknown.
+        targets: (k, 3) points that are looked at [platform coordinates], where frames are known;
+            a first guess of the distances' ends where they are not.
         stations: (k, 3) fixed ends of the distances [base coordinates]; likewise.
         time: (n,) of each row, in any unit: fit a drift of zeros and frame over it, and keep it
             where the data show one.
@@ -96,14 +85,14 @@ def calibrate(
     Source: Van Trees, Detection, Estimation and Modulation Theory (1968), sec. 2.4; derivation in
         docs/calibration.md.
     """
-    if kind not in KINDS:
-        raise GoughError(f"kind: expected one of {', '.join(KINDS)}; found {kind!r}")
+    check_kind(kind)
     if frames not in ("unknown", "known"):
         raise GoughError(f"frames: expected 'unknown' or 'known', found {frames!r}")
     readings = as_readings(legs)
     if readings.ndim != 2:
         raise GoughError(f"legs: expected (n, 6), got {readings.shape}")
-    sensor, good = _sensor(platform, kind, measured, sigma, frames == "known")
+    pivot = platform.pivot_point if frames == "known" else np.zeros(3)
+    sensor, good = as_sensor(kind, measured, sigma, pivot)
     if len(sensor) != len(readings):
         raise GoughError(
             f"legs, measured: expected as many rows, found {len(readings)} and {len(sensor)}"
@@ -115,9 +104,8 @@ def calibrate(
         parameters, sensor[rows], readings[rows], check_sigma("leg_sigma", leg_sigma),
         frames == "unknown",
     )  # fmt: skip
-    left_out = len(readings) - len(rows)
-    messages = [f"{left_out} of {len(readings)} rows hold NaN and are left out."] * bool(left_out)
-    given = _given_place(platform, kind, sensor, targets, stations, problem.free)
+    messages = _left_out(good)
+    given = known_place(kind, sensor, targets, stations, problem.free)
     start, rank = _start(problem, given, robust)
     estimate = robust_fit(problem, start) if robust else plain_fit(problem, start)
     if time is not None:
@@ -131,74 +119,11 @@ def calibrate(
     return Calibration(problem, estimate, start, rows, rank, tuple(messages))
 
 
-# ---- input ----------------------------------------------------------------------------
-
-
-def _sensor(
-    platform: Platform, kind: str, measured: Any, sigma: Any, known: bool
-) -> tuple[Any, NDArray[np.bool_]]:
-    """The instrument with all rows, and which of them (n,) hold numbers throughout."""
-    if kind == "pose":
-        pose = as_pose(measured)
-        if len(pose.batch) != 1:
-            raise GoughError(f"measured: expected poses (n), found batch axes {pose.batch}")
-        pair = np.atleast_1d(as_batch("sigma", sigma, ()))
-        if pair.shape != (2,):
-            raise GoughError("sigma: expected a pair, of position and of rotation [rad]")
-        noise = (check_sigma("sigma[0]", pair[0]), check_sigma("sigma[1]", pair[1]))
-        good = np.all(np.isfinite(pose.position), -1) & np.all(np.isfinite(pose.wxyz), -1)
-        filled = Pose(
-            np.where(good[:, None], pose.position, 0), np.where(good[:, None], pose.wxyz, 1)
-        )
-        return PoseSensor(Rigid.of(filled, platform.pivot_point if known else 0.0), noise), good
-    number = as_batch("sigma", sigma, ())
-    if number.shape != ():
-        raise GoughError(f"sigma: expected one number for {kind}, found {sigma!r}")
-    noise = check_sigma("sigma", float(number))
-    values = as_batch("measured", measured, SHAPES[kind])
-    dimensions = {"position": 2, "targets": 3, "distances": 2, "inclinometer": 2}[kind]
-    if values.ndim != dimensions or values.size == 0:
-        wanted = {"position": "(n, 3)", "targets": "(n, k, 3)", "distances": "(n, k)"}
-        raise GoughError(
-            f"measured: expected {wanted.get(kind, '(n, 2)')} for {kind}, got {values.shape}"
-        )
-    good = np.all(np.isfinite(values.reshape(len(values), -1)), axis=1)
-    if kind == "position":
-        return TargetSensor(values[:, None], noise), good
-    if kind == "targets":
-        if values.shape[1] < 2:
-            raise GoughError("measured: one target is kind 'position'; expected two or more")
-        return TargetSensor(values, noise), good
-    if kind == "distances":
-        return DistanceSensor(values, noise), good
-    return InclinometerSensor(np.sin(values), noise), good
-
-
-def _given_place(
-    platform: Platform, kind: str, sensor: Any, targets: Any, stations: Any, free: bool
-) -> Any:
-    """The placement that the caller states, or None where it is to be found."""
-    points = None if targets is None else as_batch("targets", targets, (3,)).reshape(-1, 3)
-    ends = None if stations is None else as_batch("stations", stations, (3,)).reshape(-1, 3)
-    k = {"pose": 0, "inclinometer": 0}.get(kind)
-    k = (sensor.points if kind in ("position", "targets") else sensor.distances).shape[1] \
-        if k is None else k  # fmt: skip
-    for name, value in (("targets", points), ("stations", ends)):
-        if value is not None and len(value) != k:
-            raise GoughError(f"{name}: expected {k} points, found {len(value)}")
-    if kind == "pose":
-        return None if free else Frames(Rigid.identity(), Rigid.identity())
-    if kind == "inclinometer":
-        return None if free else Level(np.array([0.0, 0.0, 1.0]), np.eye(3))
-    if kind == "distances":
-        if points is not None and ends is not None:
-            return Bars(ends, points)
-        if not free:
-            raise GoughError("targets, stations: needed for distances with known frames")
-        return None
-    if free:
-        return None
-    return Targets(Rigid.identity(), np.zeros((k, 3)) if points is None else points)
+def _left_out(good: NDArray[np.bool_]) -> list[str]:
+    bad = np.flatnonzero(~good) + 1
+    if not len(bad):
+        return []
+    return [f"{len(bad)} of {len(good)} rows hold NaN and are left out: {row_numbers(bad)}."]
 
 
 # ---- start ------------------------------------------------------------------------------
@@ -221,7 +146,7 @@ def _start(problem: Problem, given: Any, robust: bool) -> tuple[State, int]:
     else:
         text = f"only {found.sum()} of {len(problem)} readings have a pose on the drawn machine"
         raise GoughError(_misfit_text(likely_mistake(problem), text))
-    m = problem.rows(state)[0].errors.shape[1]
+    m = problem.numbers
     reachable = identify.rank(parameters, sensor, state.place)
     needed = identify.needed_poses(parameters, reachable, m)
     if len(problem) < needed:

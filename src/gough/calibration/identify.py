@@ -24,9 +24,14 @@ WORDS = {
         "One distance does not show rotations about its station and about its target: 6 "
         "directions, which move all base joints or all platform joints, stay as drawn."
     ),
+    "orientation": (
+        "Orientations show no position: 6 directions (translations of all base joints and of all "
+        "platform joints), with gains the size of the machine too, stay as drawn."
+    ),
     "inclinometer": (
         "An inclinometer shows neither position nor heading: 7 directions (translations of all "
-        "base or all platform joints, the rotation about the vertical, the scale) stay as drawn."
+        "base joints and of all platform joints, the rotation of the base about the vertical), "
+        "with gains the size of the machine too, stay as drawn."
     ),
 }
 
@@ -42,10 +47,9 @@ def rank(parameters: Parameters, sensor: Sensor, place: object) -> int:
     workspace = Workspace.__new__(Workspace)
     workspace.problem, workspace.legs, workspace.near = problem, legs, near
     G = workspace.derivatives(state)[0][..., : parameters.drawn.size]
-    size = parameters.drawing.size
     units = np.ones(G.shape[1])
     if sensor.kind == "pose":
-        units[3:] = size
+        units[3:] = parameters.drawing.size
     return numerical_rank((G * units[:, None]).reshape(-1, G.shape[-1]))
 
 
@@ -53,13 +57,14 @@ def numerical_rank(A: Array) -> int:
     """Rank of a matrix whose columns have different units."""
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1
-    values = np.linalg.svd(A / scale, compute_uv=False)
+    triangle = np.linalg.qr(A / scale, mode="r")  # faster than the values of the whole matrix
+    values = np.linalg.svd(triangle, compute_uv=False)
     return int(np.sum(values > ZERO * values[0])) if values[0] > 0 else 0
 
 
-def in_words(sensor: Sensor, numbers: int) -> str:
+def in_words(sensor: Sensor) -> str:
     """Sentence on what an instrument cannot see by its nature; empty if there is nothing."""
-    kind = "one distance" if sensor.kind == "distances" and numbers == 1 else sensor.kind
+    kind = "one distance" if sensor.kind == "distances" and sensor.numbers == 1 else sensor.kind
     return WORDS[kind]
 
 

@@ -10,8 +10,17 @@ from typing import Any
 
 import numpy as np
 
+from gough.calibration.inputs import check_kind
 from gough.checks import Array
-from gough.columns import LEGS, POSITION, checked, leg_columns, pose_columns
+from gough.columns import (
+    LEGS,
+    POSITION,
+    ROTATION_TEXT,
+    checked,
+    leg_columns,
+    pose_columns,
+    rotation_columns,
+)
 from gough.errors import GoughError, InputError
 from gough.files import Reading, open_source
 from gough.platform import Platform
@@ -19,12 +28,22 @@ from gough.pose import poses_from_columns
 
 TILTS = ("tilt_x", "tilt_y")
 COLUMNS = {
-    "pose": "x, y, z and a rotation (qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg)",
+    "pose": f"x, y, z and a rotation ({ROTATION_TEXT})",
+    "orientation": f"a rotation ({ROTATION_TEXT})",
     "position": "x, y, z",
     "targets": "x_1, y_1, z_1, x_2, y_2, z_2, ...",
     "distances": "distance_1, distance_2, ...",
     "inclinometer": "tilt_x_deg, tilt_y_deg, or tilt_x, tilt_y [rad]",
 }
+
+NOISE = {
+    "pose": ("sigma", "sigma_deg"),
+    "orientation": ("sigma_deg",),
+    "position": ("sigma",),
+    "targets": ("sigma",),
+    "distances": ("sigma",),
+    "inclinometer": ("sigma_deg",),
+}  # standard deviations of each row: [platform unit], [deg]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,36 +53,44 @@ class Measured:
     Attributes:
         legs: (n, 6) readings.
         measured: as `gough.calibrate` takes it.
+        sigma: standard deviations as `gough.calibrate` takes them.
         time: (n,) the time column, or None.
         place: where row i stands in the file, such as "line 17".
     """
 
     legs: Array
     measured: Any
+    sigma: Any
     time: Array | None
     place: Callable[[int], str]
 
 
 def read_measured(
-    path: str, platform: Platform, kind: str = "pose", time: str | None = None
+    path: str,
+    platform: Platform,
+    kind: str = "pose",
+    time: str | None = None,
+    sigma: Sequence[float] = (),
 ) -> Measured:
     """Read a .csv or .parquet file of measurements.
 
     Args:
         kind: what was measured, which says what columns there are; see `COLUMNS`.
         time: name of the column of time.
+        sigma: standard deviations [platform unit], [deg] of every row; without them each row has
+            its own, in the columns `NOISE[kind]`.
 
     Raises:
         GoughError: a kind that is not known.
         InputError: columns that are missing, values that are no numbers.
     """
-    if kind not in COLUMNS:
-        raise GoughError(f"measured: expected one of {', '.join(COLUMNS)}; found {kind!r}")
+    check_kind(kind)
     with closing(open_source(path, platform)) as source:
         found = source.columns
         legs = leg_columns(source.where, found)
         names = _columns(source.where, kind, found)
-        extra = () if time is None else checked(source.where, found, [time])
+        extra = _noise_columns(source.where, kind, found, sigma) + ([time] if time else [])
+        checked(source.where, found, extra)
         blocks = list(source.blocks([*legs, *names, *extra], rows=Reading().block_rows))
     values = np.concatenate([block.numbers([*LEGS, *names, *extra]) for block in blocks])
     starts = np.cumsum([0, *(len(block) for block in blocks)])
@@ -73,13 +100,39 @@ def read_measured(
         return blocks[block].place(row - int(starts[block]))
 
     count = 6 + len(names)
-    when = values[:, count] if time is not None else None
-    return Measured(values[:, :6], _as_measured(kind, values[:, 6:count], names), when, place)
+    when = values[:, -1] if time is not None else None
+    measured = _as_measured(kind, values[:, 6:count], names)
+    own = values[:, count : count + len(NOISE[kind])]
+    noise = stated_noise(kind, sigma) if sigma else _sigma(kind, own)
+    return Measured(values[:, :6], measured, noise, when, place)
+
+
+def _noise_columns(
+    where: str, kind: str, found: Sequence[str], sigma: Sequence[float]
+) -> list[str]:
+    if sigma:
+        return []
+    missing = [name for name in NOISE[kind] if name not in found]
+    if missing:
+        raise InputError(
+            f"{where}: no column {', '.join(missing)}; state the standard deviation of what was "
+            "measured by --sigma, or for each row in a column of that name"
+        )
+    return list(NOISE[kind])
+
+
+def _sigma(kind: str, values: Array) -> Array:
+    """Standard deviations [platform unit], [rad] of those in a file [platform unit], [deg]."""
+    degrees = [name.endswith("_deg") for name in NOISE[kind]]
+    sigma = np.where(degrees, np.radians(values), values)
+    return sigma if kind == "pose" else sigma[:, 0]
 
 
 def _columns(where: str, kind: str, found: Sequence[str]) -> tuple[str, ...]:
     if kind == "pose":
         return pose_columns(where, found)
+    if kind == "orientation":
+        return rotation_columns(where, found)
     if kind == "position":
         return checked(where, found, POSITION)
     if kind == "inclinometer":
@@ -101,8 +154,25 @@ def _columns(where: str, kind: str, found: Sequence[str]) -> tuple[str, ...]:
 def _as_measured(kind: str, values: Array, names: tuple[str, ...]) -> Any:
     if kind == "pose":
         return poses_from_columns(values, names)[0]
+    if kind == "orientation":
+        nowhere = np.zeros((len(values), 3))
+        return poses_from_columns(np.concatenate([nowhere, values], axis=1), (*POSITION, *names))[0]
     if kind == "targets":
         return values.reshape(len(values), -1, 3)
     if kind == "inclinometer" and names[0].endswith("_deg"):
         return np.radians(values)
     return values
+
+
+def stated_noise(kind: str, numbers: Sequence[float]) -> float | tuple[float, ...]:
+    """Standard deviation as `gough.calibrate` takes it, of --sigma [platform unit], [deg].
+
+    Raises:
+        GoughError: another count of numbers.
+    """
+    wanted = len(NOISE[kind])
+    if len(numbers) != wanted:
+        raise GoughError(f"--sigma: expected {wanted} number{'s' * (wanted > 1)} for {kind}, found "
+                         f"{len(numbers)}")  # fmt: skip
+    noise = _sigma(kind, np.array([numbers]))[0]
+    return tuple(noise) if kind == "pose" else float(noise)

@@ -9,22 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
+from gough import quaternion
 from gough.calibration.estimate import Problem, place_instrument, poses_of_readings
 from gough.calibration.residuals import Rigid
 from gough.calibration.robust import find_start
 from gough.calibration.sensors import (
-    DistanceSensor,
-    InclinometerSensor,
+    OrientationSensor,
     PoseSensor,
+    ReadingsSensor,
     Sensor,
     TargetSensor,
 )
 from gough.pose import Pose
 
 LOOKED_AT = 40  # poses that mistakes are sought in
+ENOUGH = 6  # iterations with which data that fit are placed
 FAR = 9.0  # squared distance per number from which the fit on the drawing is called impossible
 CLEARER = 30.0  # times smaller a squared distance must be for a mistake to be named
 ALIKE = 4.0  # times the best squared distance up to which others are named, too
@@ -44,11 +47,11 @@ def misfit(problem: Problem) -> float:
     if found.sum() < max(4, len(problem) // 3):
         return np.inf
     try:
-        start = find_start(problem, near, found, robust=False)
+        start = find_start(problem, near, found, robust=False, iterations=ENOUGH)
         _, distance = place_instrument(problem, start, iterations=3)
     except np.linalg.LinAlgError:
         return np.inf
-    return float(np.median(distance[found])) / problem.rows(start)[0].errors.shape[1]
+    return float(np.median(distance[found])) / problem.numbers
 
 
 def likely_mistake(problem: Problem) -> str | None:
@@ -72,16 +75,40 @@ def likely_mistake(problem: Problem) -> str | None:
 def _mistakes(problem: Problem) -> Iterator[tuple[str, Undo]]:
     sensor = problem.sensor
     if isinstance(sensor, PoseSensor):
-        yield "the poses are inverse: measuring frame in tool coordinates", _sensor(_inverse)
-        yield "the rotations are transposed", _sensor(_transposed)
-        yield "the Euler angles are in another order (Rz Ry Rx, roll-pitch-yaw)", _sensor(_rpy)
-        yield "the quaternions are in the order x, y, z, w", _sensor(_xyzw)
-        yield "the measuring frame is left-handed (mirrored)", _sensor(_mirrored)
-        yield "angles in degrees are given as radians, or the reverse", _sensor(_degrees)
+        yield (
+            "the poses are inverse: measuring frame in tool coordinates",
+            _poses(lambda p: p.inverse()),
+        )
+    if isinstance(sensor, (PoseSensor, OrientationSensor)):
+        yield (
+            "the rotations are transposed",
+            _poses(lambda p: Pose(p.position, quaternion.conjugate(p.wxyz))),
+        )
+        yield (
+            "the Euler angles are in another order (Rz Ry Rx, roll-pitch-yaw)",
+            _poses(lambda p: Pose.from_rpy(p.position, p.euler)),
+        )
+        yield (
+            "the quaternions are in the order x, y, z, w",
+            _poses(lambda p: Pose(p.position, np.roll(p.wxyz, 1, axis=-1))),
+        )
+        yield "the measuring frame is left-handed (mirrored)", _poses(_mirrored)
+        yield (
+            "angles in radians stand in columns of degrees",
+            _poses(lambda p: Pose.from_euler(p.position, np.degrees(p.euler))),
+        )
+        yield (
+            "angles in degrees stand in columns of radians",
+            _poses(lambda p: Pose.from_euler(p.position, np.radians(p.euler))),
+        )
     if isinstance(sensor, TargetSensor):
-        yield "the measuring frame is left-handed (mirrored)", _sensor(_mirrored_points)
+        yield (
+            "the measuring frame is left-handed (mirrored)",
+            _sensor(lambda s: replace(s, values=s.values * FLIP)),
+        )
     for text, factor in UNITS.items():
-        yield f"lengths are measured in {text}", _sensor(lambda s, k=factor: _scaled(s, k))
+        if sensor.kind not in ("inclinometer", "orientation"):
+            yield f"lengths are measured in {text}", _sensor(lambda s, k=factor: _scaled(s, k))
         if not problem.parameters.rotary:
             yield f"the legs are read in {text}", _legs(lambda x, k=factor: x * k)
     for shift, side in ((1, "behind"), (-1, "ahead of")):
@@ -100,8 +127,20 @@ def _mistakes(problem: Problem) -> Iterator[tuple[str, Undo]]:
         yield "motor angles are in degrees", _legs(np.radians)
 
 
-def _sensor(change: Callable[[Sensor], Sensor]) -> Undo:
+def _sensor(change: Callable[[Any], Sensor]) -> Undo:
     return lambda problem: replace(problem, sensor=change(problem.sensor))
+
+
+def _poses(change: Callable[[Pose], Pose]) -> Undo:
+    """Change what a pose or orientation sensor measured."""
+
+    def changed(sensor: PoseSensor | OrientationSensor) -> Sensor:
+        if isinstance(sensor, PoseSensor):
+            return replace(sensor, pose=Rigid.of(change(sensor.pose.pose())))
+        turned = change(Pose.from_rotation(np.zeros(3), sensor.values))
+        return replace(sensor, values=turned.rotation)
+
+    return _sensor(changed)
 
 
 def _legs(change: Callable) -> Undo:
@@ -118,52 +157,15 @@ def _rows(shift: int) -> Undo:
     return undo
 
 
-def _with(sensor: Sensor, R: np.ndarray, t: np.ndarray | None = None) -> PoseSensor:
-    assert isinstance(sensor, PoseSensor)
-    return replace(sensor, pose=Rigid(R, sensor.pose.t if t is None else t))
+FLIP = np.array([1.0, -1.0, 1.0])
 
 
-def _inverse(sensor: Sensor) -> Sensor:
-    back = sensor.pose.inverse()  # pyright: ignore[reportAttributeAccessIssue]
-    return _with(sensor, back.R, back.t)
-
-
-def _transposed(sensor: Sensor) -> Sensor:
-    return _with(sensor, np.swapaxes(sensor.pose.R, 1, 2))  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def _rpy(sensor: Sensor) -> Sensor:
-    pose = sensor.pose.pose()  # pyright: ignore[reportAttributeAccessIssue]
-    return _with(sensor, Pose.from_rpy(pose.position, pose.euler).rotation)
-
-
-def _xyzw(sensor: Sensor) -> Sensor:
-    pose = sensor.pose.pose()  # pyright: ignore[reportAttributeAccessIssue]
-    return _with(sensor, Pose(pose.position, np.roll(pose.wxyz, 1, axis=-1)).rotation)
-
-
-def _mirrored(sensor: Sensor) -> Sensor:
-    flip = np.array([1.0, -1.0, 1.0])
-    pose = sensor.pose  # pyright: ignore[reportAttributeAccessIssue]
-    return _with(sensor, flip[:, None] * pose.R * flip, pose.t * flip)
-
-
-def _degrees(sensor: Sensor) -> Sensor:
-    pose = sensor.pose.pose()  # pyright: ignore[reportAttributeAccessIssue]
-    return _with(sensor, Pose.from_euler(pose.position, np.radians(pose.euler)).rotation)
-
-
-def _mirrored_points(sensor: Sensor) -> Sensor:
-    assert isinstance(sensor, TargetSensor)
-    return replace(sensor, points=sensor.points * [1.0, -1.0, 1.0])
+def _mirrored(pose: Pose) -> Pose:
+    return Pose(pose.position * FLIP, pose.wxyz * [1.0, -1.0, 1.0, -1.0])
 
 
 def _scaled(sensor: Sensor, factor: float) -> Sensor:
     if isinstance(sensor, PoseSensor):
-        return _with(sensor, sensor.pose.R, sensor.pose.t * factor)
-    if isinstance(sensor, TargetSensor):
-        return replace(sensor, points=sensor.points * factor)
-    if isinstance(sensor, DistanceSensor):
-        return replace(sensor, distances=sensor.distances * factor)
-    assert isinstance(sensor, InclinometerSensor)
-    return sensor
+        return replace(sensor, pose=Rigid(sensor.pose.R, sensor.pose.t * factor))
+    assert isinstance(sensor, ReadingsSensor)
+    return replace(sensor, values=sensor.values * factor)

@@ -12,15 +12,13 @@ from typing import Any
 import numpy as np
 
 from gough.calibration.arrays import Array
+from gough.calibration.placements import Bars, Frames, Level, Rotations, Targets
 from gough.calibration.residuals import Rigid
 from gough.calibration.sensors import (
-    Bars,
     DistanceSensor,
-    Frames,
     InclinometerSensor,
-    Level,
+    OrientationSensor,
     PoseSensor,
-    Targets,
     TargetSensor,
 )
 
@@ -39,17 +37,23 @@ def _(sensor: PoseSensor, pose: Rigid) -> list[Frames]:
     that turns the positions of X into those of M, which needs translations.
     """
     measured = sensor.pose
-    turns = []
-    K = np.einsum("nij,nkl->ikjl", pose.R, measured.R).reshape(9, 9)
-    u, _, vt = np.linalg.svd(K)
-    for sign in (1, -1):
-        frame, tool = (sign * u[:, 0]).reshape(3, 3).T, (sign * vt[0]).reshape(3, 3).T
-        if np.linalg.det(frame) > 0:
-            turns.append((nearest_rotation(frame), nearest_rotation(tool)))
+    turns = _turns_by_rotations(pose.R, measured.R)
     frame = _turn_between(pose.t, measured.t)
     tool = nearest_rotation(np.sum(np.swapaxes(measured.R, 1, 2) @ frame @ pose.R, axis=0))
     turns.append((frame, tool))
     return [Frames(*_positions(pose, measured, *turn)) for turn in turns]
+
+
+def _turns_by_rotations(pose: Array, measured: Array) -> list[tuple[Array, Array]]:
+    """R_F and R_H with R_M R_H = R_F R_X, from rotations (n, 3, 3) alone."""
+    K = np.einsum("nij,nkl->ikjl", pose, measured).reshape(9, 9)
+    u, _, vt = np.linalg.svd(K)
+    turns = []
+    for sign in (1, -1):
+        frame, tool = (sign * u[:, 0]).reshape(3, 3).T, (sign * vt[0]).reshape(3, 3).T
+        if np.linalg.det(frame) > 0:
+            turns.append((nearest_rotation(frame), nearest_rotation(tool)))
+    return turns
 
 
 def _positions(pose: Rigid, measured: Rigid, frame: Array, tool: Array) -> tuple[Rigid, Rigid]:
@@ -62,8 +66,15 @@ def _positions(pose: Rigid, measured: Rigid, frame: Array, tool: Array) -> tuple
 
 
 @candidates.register
+def _(sensor: OrientationSensor, pose: Rigid) -> list[Rotations]:
+    here = np.zeros(3)
+    turns = _turns_by_rotations(pose.R, sensor.values)
+    return [Rotations(Rigid(frame, here), Rigid(tool, here)) for frame, tool in turns]
+
+
+@candidates.register
 def _(sensor: TargetSensor, pose: Rigid) -> list[Targets]:
-    points = sensor.points
+    points = sensor.values
     turns = [_turn_between(pose.t, points.mean(axis=1))]
     if points.shape[1] >= 3:
         body = _body_poses(points)
@@ -110,7 +121,7 @@ def _(sensor: DistanceSensor, pose: Rigid) -> list[Bars]:
     square = np.sum(pose.t**2, axis=1)
     ones = np.ones((len(square), 1))
     seen = np.einsum("nji,nj->ni", pose.R, pose.t)
-    for d in sensor.distances.T:
+    for d in sensor.values.T:
         right = d**2 - square
         z = _scaled_least_squares(np.concatenate([-2 * pose.t, ones], axis=1), right)
         simple.append((z[:3], np.zeros(3)))
@@ -130,7 +141,7 @@ def _scaled_least_squares(rows: Array, right: Array) -> Array:
 @candidates.register
 def _(sensor: InclinometerSensor, pose: Rigid) -> list[Level]:
     """R_X Q a = u for the vertical a that the instrument sees: a null vector of 12 numbers."""
-    sines = sensor.sines
+    sines = sensor.values
     up = np.sqrt(np.maximum(1 - np.sum(sines**2, axis=1), 0))
     seen = np.concatenate([sines, up[:, None]], axis=1)
     rows = np.concatenate(

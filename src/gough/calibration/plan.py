@@ -20,19 +20,19 @@ from numpy.typing import NDArray
 
 from gough.calibration.arrays import Array
 from gough.calibration.estimate import LOOSE, Problem, State, whiten
+from gough.calibration.inputs import check_kind, check_sigma
+from gough.calibration.kinds import Kind
 from gough.calibration.parameters import Parameters
+from gough.calibration.placements import Bars, Frames, Level, Rotations, Targets
 from gough.calibration.prediction import Error, Workspace
 from gough.calibration.residuals import Rigid
 from gough.calibration.sensors import (
-    Bars,
     DistanceSensor,
-    Frames,
     InclinometerSensor,
-    Level,
+    OrientationSensor,
     PoseSensor,
-    Targets,
+    Sensor,
     TargetSensor,
-    check_sigma,
 )
 from gough.checks import as_batch
 from gough.errors import GoughError
@@ -42,7 +42,6 @@ from gough.pose import Pose
 
 MILLIMETRE = {"mm": 1.0, "m": 1e-3, "cm": 0.1, "inch": 1 / 25.4, "in": 1 / 25.4, "um": 1e3}
 INSTRUMENTS = {"tracker": (0.01, 0.002), "camera": (0.1, 0.05)}  # [mm], [deg]
-KINDS = ("pose", "position", "targets", "distances", "inclinometer")
 CANDIDATES = 500  # poses to choose from: half from the box, half at its corners and faces
 SWEEPS = 2  # of exchanging each pose for a better one
 UNSEEN = 10.0  # [platform sizes], [rad]: standard deviation of a placement before any measurement
@@ -70,7 +69,7 @@ def plan_poses(
     count: int,
     sensor: Literal["tracker", "camera"] = "tracker",
     *,
-    kind: str = "pose",
+    kind: Kind = "pose",
     sigma: Any = None,
     leg_sigma: float | None = None,
     tolerance: float | None = None,
@@ -100,8 +99,7 @@ def plan_poses(
     if count < 1 or reference_every < 0:
         raise GoughError(f"count, reference_every: expected above 0, found {count}, "
                          f"{reference_every}")  # fmt: skip
-    if kind not in KINDS:
-        raise GoughError(f"kind: expected one of {', '.join(KINDS)}; found {kind!r}")
+    check_kind(kind)
     noise, leg_noise, spread = _stated(platform, sensor, kind, sigma, leg_sigma, tolerance)
     poses, legs, near = _candidates(platform, seed)
     parameters = Parameters(platform, spread, gains)
@@ -134,7 +132,7 @@ def _stated(
             raise GoughError(f"sensor: expected {' or '.join(INSTRUMENTS)}; found {sensor!r}")
         position, degrees = INSTRUMENTS[sensor]
         pair = position * (unit or 1.0), float(np.radians(degrees))
-        sigma = pair if kind == "pose" else pair[kind == "inclinometer"]
+        sigma = pair if kind == "pose" else pair[kind in ("inclinometer", "orientation")]
     if kind == "pose":
         numbers = as_batch("sigma", sigma, (2,))
         sigma = tuple(check_sigma("sigma", float(x)) for x in numbers)
@@ -171,11 +169,13 @@ def _candidates(platform: Platform, seed: int) -> tuple[Pose, Array, Rigid]:
     return poses[chosen], legs[chosen], Rigid.of(poses[chosen], platform.pivot_point)
 
 
-def _instrument(platform: Platform, kind: str, sigma: Any, pose: Rigid) -> tuple[Any, Any]:
+def _instrument(platform: Platform, kind: str, sigma: Any, pose: Rigid) -> tuple[Sensor, Any]:
     """The instrument, measuring the poses exactly, and a plausible placement of it."""
     frame, n = Rigid.identity(), len(pose.t)
     if kind == "pose":
         return PoseSensor(pose, sigma), Frames(frame, frame)
+    if kind == "orientation":
+        return OrientationSensor(pose.R, sigma), Rotations(frame, frame)
     if kind == "inclinometer":
         level = Level(np.array([0.0, 0.0, 1.0]), np.eye(3))
         return InclinometerSensor(np.zeros((n, 2)), sigma), level
@@ -190,9 +190,8 @@ def _instrument(platform: Platform, kind: str, sigma: Any, pose: Rigid) -> tuple
 def _prior(parameters: Parameters, place: Any, A: Array) -> Array:
     """Information (P, P) before any pose."""
     count = parameters.drawn.size
-    size = parameters.drawing.size * UNSEEN
-    lengths = np.full(place.count, size)
-    if isinstance(place, Level):
+    lengths = np.full(place.count, parameters.drawing.size * UNSEEN)
+    if isinstance(place, (Level, Rotations)):
         lengths[:] = UNSEEN
     elif not isinstance(place, Bars):
         lengths[3:6] = UNSEEN

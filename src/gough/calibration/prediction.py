@@ -15,7 +15,7 @@ import numpy as np
 from gough.calibration.arrays import Array
 from gough.calibration.estimate import Estimate, Problem, State, place_instrument
 from gough.calibration.residuals import Rigid, forward
-from gough.calibration.sensors import through_struts
+from gough.calibration.sensors import per_leg
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
 from gough.pose import Pose
@@ -30,8 +30,9 @@ class Error:
     """Root mean square errors over the workspace.
 
     Attributes:
-        position: of poses, targets or distances [platform unit]; NaN for an inclinometer.
-        rotation: of poses or tilts [rad]; NaN where only positions are measured.
+        position: of poses, targets or distances [platform unit]; NaN where only angles are
+            measured.
+        rotation: of poses, orientations or tilts [rad]; NaN where only positions are measured.
     """
 
     position: float
@@ -55,7 +56,7 @@ class Workspace:
         problem = self.problem
         pose, found = forward(problem.parameters, state.values, self.legs, self.near)
         by_pose, by_place = problem.sensor.sensitivity(state.place, pose)
-        own = through_struts(by_pose, found)[1]
+        own = per_leg(-by_pose @ np.linalg.inv(found.twist), found.legs)
         if not problem.free:
             by_place = by_place[..., :0]
         return np.concatenate([own, np.broadcast_to(by_place, (*own.shape[:2], by_place.shape[2]))],
@@ -74,7 +75,7 @@ class Workspace:
         none = np.full(squares.shape[:-1], np.nan)
         if kind == "pose":
             return squares[..., :3].sum(-1), squares[..., 3:].sum(-1)
-        if kind == "inclinometer":
+        if kind in ("inclinometer", "orientation"):
             return none, squares.sum(-1)
         per = squares.shape[-1] if kind == "distances" else squares.shape[-1] // 3
         return squares.sum(-1) / per, none
@@ -146,8 +147,8 @@ def leave_one_out(problem: Problem, estimate: Estimate, drawn: State) -> tuple[A
                     estimate.weights)  # fmt: skip
 
     rows, _ = problem.rows(drawn)
-    loose = rows.legs * problem.parameters.tolerance.ravel()
-    root = np.linalg.cholesky(rows.covariance + loose @ np.swapaxes(loose, 1, 2))
+    loose = rows.covariance_of(problem.parameters.tolerance)
+    root = np.linalg.cholesky(rows.covariance + loose)
     errors = np.linalg.solve(root, rows.errors[..., None])
     if problem.free:
         A = np.linalg.solve(root, rows.place)

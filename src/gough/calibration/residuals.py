@@ -20,6 +20,7 @@ The struts themselves are those of `gough.struts`, with which the tests compare 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -77,18 +78,45 @@ class Struts:
 
     Attributes:
         errors: (n, 6) by how much a strut is too long [platform unit].
-        twist: (n, 6, 6) d errors / d twist of the measured pose.
         legs: (n, 6, K) d errors / d parameters of the leg.
         reading: (n, 6) d errors / d reading.
-        frame, tool: (n, 6, 6) d errors / d twist of F and of H.
+        n, m: (n, 6, 3) directions of the struts in the measuring frame and in tool coordinates.
+        lever: (n, 6, 3) platform joints from the tool's origin, in the measuring frame.
+        base: (n or 1, 6, 3) lower ends from the frame's origin, in the measuring frame.
+        moving: (6, 3) platform joints from the platform's origin, in tool coordinates.
     """
 
     errors: Array
-    twist: Array
     legs: Array
     reading: Array
-    frame: Array
-    tool: Array
+    n: Array
+    m: Array
+    lever: Array
+    base: Array
+    moving: Array
+
+    @cached_property
+    def twist(self) -> Array:
+        """(n, 6, 6) d errors / d twist of the measured pose."""
+        return _screws(self.n, self.lever)
+
+    @property
+    def frame(self) -> Array:
+        """(n, 6, 6) d errors / d twist of F."""
+        return -_screws(self.n, self.base)
+
+    @property
+    def tool(self) -> Array:
+        """(n, 6, 6) d errors / d twist of H."""
+        return _screws(self.m, self.moving)
+
+
+def _screws(direction: Array, point: Array) -> Array:
+    """Rows (..., 6) of lines through points (..., 3): direction, and point x direction."""
+    out = np.empty((*direction.shape[:-1], 6))
+    out[..., :3] = direction
+    _cross(point, direction, out[..., 3:])
+    return out
 
 
 def struts(
@@ -99,25 +127,23 @@ def struts(
     base = low @ frame.R.T
     moving = values[:, MOVING] @ tool.R.T
     lever = (moving + tool.t) @ np.swapaxes(pose.R, -1, -2)
-    vector = lever + (pose.t - frame.t)[:, None] - base
+    vector = lever - base
+    vector += (pose.t - frame.t)[:, None]
     now = np.sqrt(np.einsum("nli,nli->nl", vector, vector))
     n = vector / now[..., None]
     m = n @ pose.R
     nb = n @ frame.R
     out = np.empty((*n.shape[:2], parameters.count))
-    out[..., BASE], out[..., MOVING] = -nb, m @ tool.R
+    np.negative(nb, out=out[..., BASE])
+    out[..., MOVING] = m @ tool.R
     for column, derivative in own:
         out[..., column] = derivative(nb)
-    both = lambda a, b: np.concatenate([a, _cross(b, a)], axis=-1)  # noqa: E731
-    return Struts(
-        now - length, both(n, lever), out, reading(nb), -both(n, np.broadcast_to(base, n.shape)),
-        both(m, np.broadcast_to(moving, m.shape)),
-    )  # fmt: skip
+    return Struts(now - length, out, reading(nb), n, m, lever, base, moving)
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross(a: Array, b: Array, out: Array | None = None) -> Array:
     """a x b for (..., 3), without the checks that make `np.cross` slow on many small ones."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape)) if out is None else out
     out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -12,7 +12,7 @@ from gough.calibration import prediction
 from gough.calibration.arrays import Array
 from gough.calibration.estimate import Estimate, Problem, State
 from gough.calibration.parameters import Parameters
-from gough.calibration.sensors import Frames, Targets
+from gough.calibration.placements import Frames, Targets
 from gough.platform import Platform
 from gough.pose import Pose
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from gough.calibration.estimate import (
     minimise,
     place_instrument,
     poses_of_readings,
+    squared_distances,
 )
 from gough.calibration.placing import candidates
 from gough.calibration.residuals import Rigid
@@ -27,12 +27,15 @@ SUBSETS, SUBSET = 8, 8  # random draws of poses for a robust start, and poses in
 CUT = 3.54  # [sigma of a normal number] distance from which a pose is an outlier: 1 of 5000
 
 
-def find_start(problem: Problem, near: Rigid, usable: NDArray[np.bool_], robust: bool) -> State:
+def find_start(
+    problem: Problem, near: Rigid, usable: NDArray[np.bool_], robust: bool, iterations: int = 20
+) -> State:
     """A placement to start from: the best of the closed forms, each refined on the drawing.
 
     Args:
         near: (n) poses of the readings on the drawing, of which the `usable` (n,) are looked at.
         robust: try random subsets of the poses too, and judge by the median pose.
+        iterations: of refining, the most.
     """
     rows = np.flatnonzero(usable)
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), STARTS)).astype(int)]
@@ -44,24 +47,22 @@ def find_start(problem: Problem, near: Rigid, usable: NDArray[np.bool_], robust:
         draws += [rng.permutation(len(rows))[:size] for _ in range(SUBSETS)]
     best: tuple[float, State] | None = None
     for draw in draws:
-        for place in _candidates(part[draw], pose[draw]):
+        for place in candidates(part[draw].sensor, pose[draw]):
             first = State(problem.parameters.drawn, place, pose[draw])
             try:
-                found, _ = place_instrument(part[draw], first, iterations=2 if robust else 20)
+                found, _ = place_instrument(
+                    part[draw], first, iterations=2 if robust else iterations
+                )
                 score, state = _judge(part, replace(found, near=pose), robust)
             except np.linalg.LinAlgError:
                 continue
             if np.isfinite(score) and (best is None or score < best[0]):
                 best = score, state
     if best is None:
-        place = _candidates(part, pose)[0]
+        place = candidates(part.sensor, pose)[0]
         return State(problem.parameters.drawn, place, near)
     state = polish_start(part, best[1]) if robust else place_instrument(part, best[1])[0]
     return replace(state, near=near)
-
-
-def _candidates(problem: Problem, pose: Rigid) -> list[Any]:
-    return candidates(problem.sensor, pose)
 
 
 def _judge(problem: Problem, state: State, robust: bool) -> tuple[float, State]:
@@ -96,7 +97,7 @@ def with_right_poses(problem: Problem, start: State, estimate: Estimate) -> Esti
     An instrument that measures less than a pose is compared with the pose of the readings. A few of
     these can be in another mode on the drawing; on the machine without them they are not.
     """
-    cut = chi_squared(problem.rows(start)[0].errors.shape[1], 2 * CUT)
+    cut = chi_squared(problem.numbers, 2 * CUT)
     if isinstance(problem.sensor, PoseSensor) or np.all(estimate.distance < cut):
         return estimate
     others = robust_fit(problem, start)
@@ -124,7 +125,7 @@ def robust_fit(problem: Problem, start: State) -> Estimate:
         some = np.linspace(0, len(problem) - 1, STARTS).astype(int)
         first = robust_fit(problem[some], replace(start, near=start.near[some])).state
         return _in_or_out(problem, replace(first, near=start.near))
-    m = problem.rows(start)[0].errors.shape[1]
+    m = problem.numbers
     cut, middle = np.sqrt(chi_squared(m, CUT)), chi_squared(m, 0.0)
     knee = float(np.sqrt(middle))
     estimate = minimise(problem, start, _first_weights(problem, start, knee, middle), iterations=3)
@@ -143,8 +144,9 @@ def robust_fit(problem: Problem, start: State) -> Estimate:
 
 def _in_or_out(problem: Problem, start: State) -> Estimate:
     """Fit the poses within the cut, from an estimate that is good already."""
-    estimate = minimise(problem, start, iterations=0)
-    cut = chi_squared(problem.rows(start)[0].errors.shape[1], CUT)
+    cut = chi_squared(problem.numbers, CUT)
+    weights = 1.0 * (squared_distances(problem, start) < cut)
+    estimate = minimise(problem, start, weights, iterations=3)
     for _ in range(4):
         weights = 1.0 * (estimate.distance < cut)
         if np.array_equal(weights, estimate.weights):

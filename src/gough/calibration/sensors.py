@@ -1,8 +1,4 @@
-"""Instruments: what each measures of a pose, and where it may stand.
-
-An instrument has a placement: where its frame, targets or stations are. Those numbers are unknown
-unless the frames are, and are fitted beside the machine's. Twists act from the left, as in
-`gough.calibration.residuals`; X is the pose of the platform in base coordinates.
+"""Instruments: what each measures of a pose X of the platform in base coordinates.
 
 A full pose is compared with the struts directly. Any other instrument is compared with the pose
 that the readings have, X(legs; values): its derivative by the parameters follows from the struts,
@@ -14,41 +10,69 @@ which also says what noise of the readings does to it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from gough.calibration.arrays import Array
 from gough.calibration.parameters import Parameters
-from gough.calibration.residuals import Rigid, Struts, exp_rotation, forward, struts
-from gough.errors import GoughError
-from gough.pose import Pose
-
-KINDS = ("pose", "position", "targets", "distances", "inclinometer")
+from gough.calibration.placements import Bars, Frames, Level, Targets
+from gough.calibration.residuals import Rigid, forward, struts
+from gough.quaternion import from_matrix, to_rotation_vector
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Weighted least squares of n poses with m numbers each, before the weights.
+    """Least squares of n poses with m errors each, before they are weighted.
+
+    A parameter acts on the strut of its own leg alone, so the derivatives by the parameters are
+    kept in two factors.
 
     Attributes:
         errors: (n, m).
-        legs: (n, m, 6 K) derivatives by the parameters of the legs.
+        by_strut: (n, m, 6) derivatives by the errors of the struts.
+        struts: (n, 6, K) derivatives of each strut's error by the parameters of its leg.
         place: (n, m, c) derivatives by the placement.
         covariance: (n, m, m) of the errors: instrument and readings.
     """
 
     errors: Array
-    legs: Array
+    by_strut: Array
+    struts: Array
     place: Array
     covariance: Array
 
+    @property
+    def legs(self) -> Array:
+        """(n, m, 6 K) derivatives by the parameters of the legs."""
+        return per_leg(self.by_strut, self.struts)
+
+    def covariance_of(self, tolerance: Array) -> Array:
+        """(n, m, m) covariance that parameters with standard deviations (6, K) add."""
+        loose = np.sqrt(np.sum((self.struts * tolerance) ** 2, axis=-1))
+        return _squared(self.by_strut * loose[:, None])
+
+
+def per_leg(by_strut: Array, struts: Array) -> Array:
+    """The product (n, m, 6 K) of derivatives (n, m, 6) by struts with theirs (n, 6, K) by legs."""
+    out = by_strut[..., None] * struts[:, None]
+    return out.reshape(*out.shape[:2], -1)
+
+
+def _squared(matrix: Array) -> Array:
+    """M M^T of matrices (..., m, k)."""
+    return matrix @ np.swapaxes(matrix, -1, -2)
+
 
 class Sensor(Protocol):
-    """An instrument and what it measured in n poses."""
+    """An instrument and the m numbers that it measured in each of n poses."""
 
-    kind: str
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def numbers(self) -> int: ...
 
     def rows(
         self, parameters: Parameters, values: Array, place: Any, legs: Array, leg_sigma: float,
@@ -64,105 +88,39 @@ class Sensor(Protocol):
     def __len__(self) -> int: ...
 
 
-# ---- placements -----------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Frames:
-    """The measuring frame (base to measuring) and the tool (platform to tool): 12 numbers."""
-
-    frame: Rigid
-    tool: Rigid
-    count = 12
-
-    def moved(self, step: Array) -> Frames:
-        """After a step (12,)."""
-        return Frames(self.frame.moved(step[:6]), self.tool.moved(step[6:]))
-
-
-@dataclass(frozen=True)
-class Targets:
-    """The measuring frame, and targets (k, 3) in platform coordinates: 6 + 3 k numbers."""
-
-    frame: Rigid
-    points: Array
-
-    @property
-    def count(self) -> int:
-        return 6 + self.points.size
-
-    def moved(self, step: Array) -> Targets:
-        return Targets(
-            self.frame.moved(step[:6]), self.points + step[6:].reshape(self.points.shape)
-        )
-
-
-@dataclass(frozen=True)
-class Bars:
-    """Stations (k, 3) in base and targets (k, 3) in platform coordinates: 6 k numbers."""
-
-    stations: Array
-    points: Array
-
-    @property
-    def count(self) -> int:
-        return 2 * self.points.size
-
-    def moved(self, step: Array) -> Bars:
-        a, b = step.reshape(2, *self.points.shape)
-        return Bars(self.stations + a, self.points + b)
-
-
-@dataclass(frozen=True)
-class Level:
-    """The vertical in base coordinates and the instrument's axes on the platform: 5 numbers."""
-
-    up: Array  # (3,)
-    mount: Array  # (3, 3): instrument to platform
-    count = 5
-
-    def tangents(self) -> Array:
-        """Two directions (2, 3) in which the vertical can lean."""
-        return np.linalg.svd(self.up[None])[2][1:]
-
-    def moved(self, step: Array) -> Level:
-        up = self.up + step[:2] @ self.tangents()
-        return Level(up / np.linalg.norm(up), exp_rotation(step[2:]) @ self.mount)
-
-
-# ---- instruments ----------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class PoseSensor:
-    """Poses (n) of a tool in a measuring frame; noise of position [unit] and rotation [rad]."""
+    """Poses (n) of a tool in a measuring frame.
+
+    Attributes:
+        pose: what was measured.
+        sigma: (2,) or (n, 2) noise of position [platform unit] and of rotation [rad].
+    """
 
     pose: Rigid
-    sigma: tuple[float, float]
+    sigma: Any
     kind = "pose"
+    numbers = 6
 
     def __len__(self) -> int:
         return len(self.pose.t)
 
     def __getitem__(self, rows) -> PoseSensor:
-        return replace(self, pose=self.pose[rows])
+        return PoseSensor(self.pose[rows], np.broadcast_to(self.sigma, (len(self), 2))[rows])
 
     def rows(self, parameters, values, place, legs, leg_sigma, near) -> tuple[Rows, Rigid]:
         found = struts(parameters, values, legs, self.pose, place.frame, place.tool)
-        n, k = len(legs), parameters.count
-        own = np.zeros((n, 6, 6, k))
-        own[:, range(6), range(6)] = found.legs
-        scaled = found.twist * np.repeat(self.sigma, 3)
-        covariance = scaled @ np.swapaxes(scaled, 1, 2)
+        noise = np.repeat(np.broadcast_to(self.sigma, (len(self), 2)), 3, axis=1)
+        covariance = _squared(found.twist * noise[:, None])
         covariance[:, range(6), range(6)] += (found.reading * leg_sigma) ** 2
-        place_columns = np.concatenate([found.frame, found.tool], axis=-1)
-        return Rows(found.errors, own.reshape(n, 6, 6 * k), place_columns, covariance), near
+        each = np.broadcast_to(np.eye(6), covariance.shape)
+        by_place = np.concatenate([found.frame, found.tool], axis=-1)
+        return Rows(found.errors, each, found.legs, by_place, covariance), near
 
     def difference(self, a: tuple[Frames, Rigid], b: tuple[Frames, Rigid]) -> Array:
         """Measured pose at placement and pose a minus that at b: position, rotation vector."""
         one, other = (place.frame @ pose @ place.tool.inverse() for place, pose in (a, b))
-        turn = Pose.from_rotation(one.t, one.R @ np.swapaxes(other.R, 1, 2)).rotation_vector
-        return np.concatenate([one.t - other.t, turn], axis=-1)
+        return np.concatenate([one.t - other.t, _turned(one.R, other.R)], axis=-1)
 
     def sensitivity(self, place: Frames, pose: Rigid) -> tuple[Array, Array]:
         """Twist of the measured pose (n, 6, .) by twist of X (6) and by the placement (12)."""
@@ -176,65 +134,86 @@ class PoseSensor:
         return by_pose, np.concatenate([by_frame, by_tool], axis=-1)
 
 
-class _ThroughReadings:
-    """Instruments that are compared with the pose that the readings have."""
+@dataclass(frozen=True)
+class ReadingsSensor:
+    """An instrument that is compared with the poses that the readings have.
+
+    Attributes:
+        values: (n, ...) what was measured.
+        sigma: one standard deviation of these numbers, or (n,).
+    """
+
+    values: Array
+    sigma: Any
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, rows):
+        return type(self)(self.values[rows], np.broadcast_to(self.sigma, len(self))[rows])
+
+    @property
+    def numbers(self) -> int:
+        """m, how many numbers are measured in a pose."""
+        return int(np.prod(self.values.shape[1:]))
+
+    def predicted(self, place, pose: Rigid) -> Array:
+        """What would be measured (n, m), the instrument placed so, at poses X (n)."""
+        raise NotImplementedError
+
+    def sensitivity(self, place, pose: Rigid) -> tuple[Array, Array]:
+        """Derivatives (n, m, .) by twist of X (6) and by the placement."""
+        raise NotImplementedError
 
     def difference(self, a: tuple[Any, Rigid], b: tuple[Any, Rigid]) -> Array:
         """Difference of the measurements at placements and poses a and b, (n, m)."""
         return self.predicted(*a) - self.predicted(*b)
 
-    def predicted(self, place, pose: Rigid) -> Array:
-        raise NotImplementedError
-
-    def measured(self) -> Array:
-        raise NotImplementedError
-
-    def variance(self) -> float:
-        raise NotImplementedError
-
-    def sensitivity(self, place, pose: Rigid) -> tuple[Array, Array]:
-        raise NotImplementedError
+    def errors(self, place, pose: Rigid) -> Array:
+        """What would be measured minus what was, (n, m)."""
+        return self.predicted(place, pose) - self.values.reshape(len(self), -1)
 
     def rows(self, parameters, values, place, legs, leg_sigma, near) -> tuple[Rows, Rigid]:
         pose, found = forward(parameters, values, legs, near)
         by_pose, by_place = self.sensitivity(place, pose)
-        per_error, own = through_struts(by_pose, found)
-        errors = self.predicted(place, pose) - self.measured()
-        noisy = per_error * (found.reading * leg_sigma)[:, None]
-        covariance = noisy @ np.swapaxes(noisy, 1, 2)
-        covariance[:, range(errors.shape[1]), range(errors.shape[1])] += self.variance()
-        return Rows(errors, own, by_place, covariance), pose
+        by_strut = -by_pose @ np.linalg.inv(found.twist)
+        errors = self.errors(place, pose)
+        covariance = _squared(by_strut * (found.reading * leg_sigma)[:, None])
+        own = np.broadcast_to(self.sigma, len(self))[:, None] ** 2
+        covariance[:, range(errors.shape[1]), range(errors.shape[1])] += own
+        return Rows(errors, by_strut, found.legs, by_place, covariance), pose
 
 
-def through_struts(by_pose: Array, found: Struts) -> tuple[Array, Array]:
-    """Derivatives (n, m, .) by strut errors and by the legs' parameters, from those by the pose."""
-    per_error = -by_pose @ np.linalg.inv(found.twist)
-    own = per_error[..., None] * found.legs[:, None]
-    return per_error, own.reshape(*own.shape[:2], -1)
+class OrientationSensor(ReadingsSensor):
+    """Rotations (n, 3, 3) of a tool in a measuring frame; noise [rad]."""
+
+    kind = "orientation"
+
+    @property
+    def numbers(self) -> int:
+        return 3
+
+    def difference(self, a: tuple[Frames, Rigid], b: tuple[Frames, Rigid]) -> Array:
+        """Rotation vectors (n, 3) from the measurements at b to those at a."""
+        return _turned(*(place.frame.R @ pose.R @ place.tool.R.T for place, pose in (a, b)))
+
+    def errors(self, place: Frames, pose: Rigid) -> Array:
+        return _turned(place.frame.R @ pose.R @ place.tool.R.T, self.values)
+
+    def sensitivity(self, place: Frames, pose: Rigid) -> tuple[Array, Array]:
+        shape = pose.R.shape
+        turn = np.broadcast_to(place.frame.R, shape)
+        by_pose = np.concatenate([np.zeros(shape), turn], axis=-1)
+        unit = np.broadcast_to(np.eye(3), shape)
+        return by_pose, np.concatenate([unit, -turn @ pose.R @ place.tool.R.T], axis=-1)
 
 
-@dataclass(frozen=True)
-class TargetSensor(_ThroughReadings):
+class TargetSensor(ReadingsSensor):
     """Positions (n, k, 3) of k targets on the platform, in a measuring frame; noise [unit]."""
-
-    points: Array
-    sigma: float
 
     @property
     def kind(self) -> str:
-        return "position" if self.points.shape[1] == 1 else "targets"
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def __getitem__(self, rows) -> TargetSensor:
-        return replace(self, points=self.points[rows])
-
-    def measured(self) -> Array:
-        return self.points.reshape(len(self), -1)
-
-    def variance(self) -> float:
-        return self.sigma**2
+        return "position" if self.values.shape[1] == 1 else "targets"
 
     def predicted(self, place: Targets, pose: Rigid) -> Array:
         at = place.points @ np.swapaxes(pose.R, -1, -2) + pose.t[:, None]
@@ -254,25 +233,10 @@ class TargetSensor(_ThroughReadings):
         return by_pose.reshape(n, 3 * k, 6), by_place.reshape(n, 3 * k, -1)
 
 
-@dataclass(frozen=True)
-class DistanceSensor(_ThroughReadings):
+class DistanceSensor(ReadingsSensor):
     """Distances (n, k) from stations on the base to targets on the platform; noise [unit]."""
 
-    distances: Array
-    sigma: float
     kind = "distances"
-
-    def __len__(self) -> int:
-        return len(self.distances)
-
-    def __getitem__(self, rows) -> DistanceSensor:
-        return replace(self, distances=self.distances[rows])
-
-    def measured(self) -> Array:
-        return self.distances
-
-    def variance(self) -> float:
-        return self.sigma**2
 
     def predicted(self, place: Bars, pose: Rigid) -> Array:
         return np.linalg.norm(self._bars(place, pose)[0], axis=-1)
@@ -292,25 +256,10 @@ class DistanceSensor(_ThroughReadings):
         return lever + pose.t[:, None] - place.stations, lever
 
 
-@dataclass(frozen=True)
-class InclinometerSensor(_ThroughReadings):
+class InclinometerSensor(ReadingsSensor):
     """Sines (n, 2) of the angles of an instrument's x and y axes above the horizontal."""
 
-    sines: Array
-    sigma: float
     kind = "inclinometer"
-
-    def __len__(self) -> int:
-        return len(self.sines)
-
-    def __getitem__(self, rows) -> InclinometerSensor:
-        return replace(self, sines=self.sines[rows])
-
-    def measured(self) -> Array:
-        return self.sines
-
-    def variance(self) -> float:
-        return self.sigma**2
 
     def predicted(self, place: Level, pose: Rigid) -> Array:
         return (place.up @ pose.R @ place.mount)[:, :2]
@@ -323,6 +272,11 @@ class InclinometerSensor(_ThroughReadings):
         seen = place.up @ pose.R  # the vertical in platform coordinates, (n, 3)
         by_mount = place.mount.T[:2] @ _skew(seen)
         return by_pose, np.concatenate([back @ place.tangents().T, by_mount], axis=-1)
+
+
+def _turned(a: Array, b: Array) -> Array:
+    """Rotation vectors (..., 3) from rotations b to a (..., 3, 3)."""
+    return to_rotation_vector(from_matrix(a @ np.swapaxes(b, -1, -2)))
 
 
 def _skew(v: Array) -> Array:
@@ -339,14 +293,3 @@ def _adjoint(turn: Array, corner: Array) -> Array:
     out[..., :3, :3] = out[..., 3:, 3:] = turn
     out[..., :3, 3:] = corner
     return out
-
-
-def check_sigma(name: str, value: float) -> float:
-    """A standard deviation, above zero and finite.
-
-    Raises:
-        GoughError: it is not.
-    """
-    if not 0 < value < np.inf:
-        raise GoughError(f"{name}: expected a standard deviation above 0, found {value!r}")
-    return float(value)

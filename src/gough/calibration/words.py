@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough.calibration.prediction import Error
 
@@ -15,3 +16,9 @@ def error_text(error: Error, unit: str) -> str:
     if np.isfinite(error.rotation):
         parts.append(f"{np.degrees(error.rotation):.3g} deg")
     return ", ".join(parts)
+
+
+def row_numbers(numbers: NDArray[np.integer]) -> str:
+    """The first of some row numbers, such as "rows 3, 12"."""
+    shown = ", ".join(map(str, numbers[:10])) + (", ..." if len(numbers) > 10 else "")
+    return f"row{'s' * (len(numbers) > 1)} {shown}"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from gough.calibration.kinds import Kind
 from gough.commands.options import Json, PlatformName, option
 
 if TYPE_CHECKING:
@@ -19,12 +20,12 @@ def run(
     measured_file: Annotated[Positional[str], arg(metavar="MEASURED")],
     *,
     platform: PlatformName,
-    sigma: Annotated[tuple[float, ...], arg(metavar="S")],
     leg_sigma: Annotated[float, arg(metavar="S")],
     tolerance: Annotated[float, arg(metavar="T")],
     out: Annotated[str | None, option(metavar="OUT", aliases=["-o"])] = None,
     json: Json = False,
-    measured: Literal["pose", "position", "targets", "distances", "inclinometer"] = "pose",
+    sigma: Annotated[tuple[float, ...], option(metavar="S")] = (),
+    measured: Kind = "pose",
     gains: Annotated[bool, option()] = False,
     frames: Literal["unknown", "known"] = "unknown",
     robust: Annotated[bool, option()] = False,
@@ -39,9 +40,9 @@ def run(
     gough calibrate measured.csv -p mine.toml -o calibrated.toml --sigma 0.01 0.002
         --leg-sigma 0.003 --tolerance 0.5
 
-    Each row has leg_1 to leg_6 and, by --measured: x, y, z and a rotation; x, y, z of a target;
-    x_1, y_1, z_1, x_2, ... of targets; distance_1, ...; or tilt_x_deg, tilt_y_deg, the angles by
-    which an inclinometer's axes point above the horizontal.
+    Each row has leg_1 to leg_6 and, by --measured: x, y, z and a rotation; a rotation; x, y, z of
+    a target; x_1, y_1, z_1, x_2, ... of targets; distance_1, ...; or tilt_x_deg, tilt_y_deg, the
+    angles by which an inclinometer's axes point above the horizontal.
 
     Exit code 0: the new file was written; 1: it was not, as the drawing may be better; 2: error.
 
@@ -49,7 +50,8 @@ def run(
         measured_file: Read the measurements from this file, .csv, .txt, .tsv, .xlsx or .parquet,
             or from standard input (-).
         sigma: State the standard deviation of what was measured: position [platform unit] and
-            rotation [deg] for poses, else one number; of an inclinometer in [deg].
+            rotation [deg] for poses, else one number; of orientations and inclinometers in [deg].
+            Without it each row has its own, in the columns sigma and sigma_deg.
         leg_sigma: State the standard deviation of the readings, in their unit (motor angles: rad).
         tolerance: State the standard deviation of joints from the drawing [platform unit].
         out: Write the calibrated machine to this .toml file.
@@ -63,8 +65,6 @@ def run(
         report: Write a report with figures to this .html file.
         force: Write the file although the drawing may be better.
     """
-    import numpy as np
-
     from gough.calibration.fit import calibrate
     from gough.calibration.measured import read_measured
     from gough.errors import GoughError
@@ -77,15 +77,9 @@ def run(
         if path is not None:
             check_target(path)
     machine = Platform.load(platform)
-    found = read_measured(measured_file, machine, measured, drift)
-    wanted = 2 if measured == "pose" else 1
-    if len(sigma) != wanted:
-        raise GoughError(f"--sigma: expected {wanted} numbers for {measured}, found {len(sigma)}")
-    degrees = float(np.radians(sigma[-1]))
-    noise = (sigma[0], degrees) if wanted == 2 else sigma[0]
-    noise = degrees if measured == "inclinometer" else noise
+    found = read_measured(measured_file, machine, measured, drift, sigma)
     calibration = calibrate(
-        machine, found.legs, found.measured, sigma=noise, leg_sigma=leg_sigma,
+        machine, found.legs, found.measured, sigma=found.sigma, leg_sigma=leg_sigma,
         tolerance=tolerance, kind=measured, gains=gains, frames=frames, robust=robust,
         targets=_points("targets", targets), stations=_points("stations", stations),
         time=found.time,

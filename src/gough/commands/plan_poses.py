@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
+from gough.calibration.kinds import Kind
 from gough.commands.options import Json, PlatformName, RandomSeed, option
 
 Number = Annotated[float | None, option(metavar="S")]
@@ -16,7 +17,7 @@ def run(
     platform: PlatformName,
     count: Annotated[int, arg(aliases=["-n"], metavar="N")] = 20,
     sensor: Literal["tracker", "camera"] = "tracker",
-    measured: Literal["pose", "position", "targets", "distances", "inclinometer"] = "pose",
+    measured: Kind = "pose",
     sigma: Annotated[tuple[float, ...], option(metavar="S")] = (),
     leg_sigma: Number = None,
     tolerance: Number = None,
@@ -49,6 +50,7 @@ def run(
     import numpy as np
     import pyarrow as pa
 
+    from gough.calibration.measured import stated_noise
     from gough.calibration.plan import plan_poses
     from gough.calibration.words import error_text
     from gough.columns import LEGS, pose_names
@@ -56,10 +58,7 @@ def run(
     from gough.platform import Platform
 
     machine = Platform.load(platform)
-    noise: float | tuple[float, ...] | None = None
-    if sigma:
-        noise = (sigma[0], *np.radians(sigma[1:])) if measured == "pose" else sigma[0]
-        noise = float(np.radians(sigma[0])) if measured == "inclinometer" else noise
+    noise = stated_noise(measured, sigma) if sigma else None
     plan = plan_poses(
         machine, count, sensor, kind=measured, sigma=noise, leg_sigma=leg_sigma,
         tolerance=tolerance, gains=gains, reference_every=reference_every, seed=random_seed,
