@@ -33,6 +33,7 @@ class Drifting:
     place: Any
     zeros: Array  # (6,) [platform unit] or [rad], over the whole time
     twist: Array  # (6,) of the frame, or () where the instrument has none
+    deviations: Array | None = None  # (6,) of the zeros, once they are fitted
 
     @property
     def count(self) -> int:
@@ -114,8 +115,9 @@ def fit_drift(
     rates = 6 + len(twist)
     if estimate.cost - found.cost < chi_squared(rates, CERTAIN):
         return problem, estimate, None
-    drift: Drifting = found.state.place
     kept = len(found.covariance) - rates
+    deviations = np.sqrt(np.diag(found.covariance)[kept : kept + 6])
+    drift: Drifting = replace(found.state.place, deviations=deviations)
     plain = drifting.corrected(drift)
     return (
         plain,

@@ -181,7 +181,10 @@ def _drift_text(platform: Platform, drift: Drifting | None) -> str:
     if drift is None:
         return "The data show no drift over time; the fit is without."
     unit = "rad" if platform.rotary is not None else platform.unit
-    zeros = ", ".join(f"{z:+.3g}" for z in drift.zeros)
+    assert drift.deviations is not None
+    zeros = ", ".join(
+        f"{z:+.2g} (+-{s:.1g})" for z, s in zip(drift.zeros, drift.deviations, strict=True)
+    )
     text = f"The data show a drift, and it is taken out: zeros of the legs by {zeros} {unit}"
     if len(drift.twist):
         moved = np.linalg.norm(drift.twist[:3])

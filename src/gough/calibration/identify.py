@@ -12,6 +12,8 @@ from gough.calibration.sensors import Sensor
 
 ZERO = 1e-10  # of the largest singular value: below it a combination is not seen at all
 
+LEARNED = 1e-3  # of the drawing's own information: below it nothing was learned
+
 WORDS = {
     "pose": "",
     "targets": "",
@@ -73,15 +75,19 @@ def needed_poses(parameters: Parameters, rank: int, numbers: int) -> int:
     return -(-rank // numbers) + 1
 
 
-def weakest(parameters: Parameters, information: Array, count: int = 3) -> list[tuple[float, str]]:
+def weakest(
+    parameters: Parameters, information: Array, count: int = 3
+) -> tuple[int, list[tuple[float, str]]]:
     """The combinations that the data say least about.
 
     Args:
         information: (P, P) of the data alone.
+        count: how many of them.
 
     Returns:
-        For each its standard deviation after as a share of that before (1: nothing learned), and
-        the parameters it is made of, in words.
+        How many combinations nothing was learned of, such as moving all base joints with a frame
+        that is not known. For each of the next: its standard deviation after measuring as a share
+        of that before, and the parameters it is made of, in words.
     """
     size = parameters.drawn.size
     tolerance = parameters.tolerance.ravel()
@@ -91,8 +97,10 @@ def weakest(parameters: Parameters, information: Array, count: int = 3) -> list[
         matrix = matrix - cross @ np.linalg.pinv(own, hermitian=True) @ cross.T
     scaled = matrix * np.outer(tolerance, tolerance)
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    shares = 1 / np.sqrt(1 + np.maximum(values, 0))
-    return [(float(shares[i]), _words(parameters, vectors[:, i])) for i in range(count)]
+    unseen = int(np.sum(values < LEARNED))
+    shares = 1 / np.sqrt(1 + values[unseen : unseen + count])
+    words = (_words(parameters, v) for v in vectors.T[unseen : unseen + count])
+    return unseen, list(zip(map(float, shares), words, strict=True))
 
 
 def _words(parameters: Parameters, vector: Array) -> str:

@@ -129,6 +129,25 @@ def _sigma(kind: str, values: Array) -> Array:
 
 
 def _columns(where: str, kind: str, found: Sequence[str]) -> tuple[str, ...]:
+    """The columns of what was measured, with advice where those of another kind are there."""
+    try:
+        return _columns_of(where, kind, found)
+    except InputError as error:
+        others = [k for k in COLUMNS if k != kind and _has_columns(k, found)]
+        cure = "readings alone show nothing of the machine, something must be measured beside them"
+        if others:
+            cure = f"the file has the columns of --measured {' or '.join(others)}"
+        raise InputError(f"{error}; {cure}") from None
+
+
+def _has_columns(kind: str, found: Sequence[str]) -> bool:
+    try:
+        return bool(_columns_of("", kind, found))
+    except InputError:
+        return False
+
+
+def _columns_of(where: str, kind: str, found: Sequence[str]) -> tuple[str, ...]:
     if kind == "pose":
         return pose_columns(where, found)
     if kind == "orientation":

@@ -130,14 +130,20 @@ def _summary(found: Calibration) -> str:
 
 def _weakest(found: Calibration) -> str:
     """The combinations that the data say least about, as a table."""
+    unseen, weak = identify.weakest(found.parameters, found.estimate.information, 8)
     rows = "".join(
-        f'<tr><td class="n">{100 * share:.0f} %</td><td>{escape(words)}</td></tr>'
-        for share, words in identify.weakest(found.parameters, found.estimate.information, 8)
+        f'<tr><td class="n">{100 * share:.1f} %</td><td>{escape(words)}</td></tr>'
+        for share, words in weak
+    )
+    more = (
+        f" Nothing was learned of {unseen} more, which stay as drawn: all base joints or all "
+        "platform joints moved together, which cannot be told from moving a frame."
+        if unseen
+        else ""
     )
     return (
         '<h2>Weakest combinations</h2><p class="note">Standard deviation after measuring as a '
-        "share of that before: at 100 % nothing was learned. Moving all base joints or all "
-        "platform joints together cannot be told from moving the frames.</p>"
+        f"share of that before.{more}</p>"
         f"<table><tr><th>left</th><th>combination</th></tr>{rows}</table>"
     )
 
@@ -262,5 +268,6 @@ def count_figure(found: Calibration) -> Figure:
     axes.set(xscale="log", yscale="log", xlabel="poses", ylabel=f"error [{unit}]")
     axes.xaxis.set_major_formatter("{x:.0f}")
     axes.xaxis.set_minor_formatter("")
+    axes.yaxis.set_major_formatter("{x:.3g}")
     axes.yaxis.set_minor_formatter("{x:.3g}")
     return figure
