@@ -46,4 +46,33 @@ def c(
     return 0
 
 
-FORMATS = {"c": c}
+def mjcf(
+    *,
+    platform: PlatformName,
+    out: Annotated[str, arg(aliases=["-o"], metavar="FILE.xml")],
+    gravity: Annotated[bool, arg(help_behavior_hint="")] = False,
+    force: Annotated[bool, arg(help_behavior_hint="")] = False,
+) -> int:
+    """A model for MuJoCo: legs, their closed loops, servos, sensors and a keyframe at home.
+
+    gough export mjcf -p rubin_camera -o rubin.xml
+
+    python -m mujoco.viewer --mjcf=rubin.xml
+
+    Lengths are in metres. Controls are leg readings; in steady state the platform has the pose
+    that gough solve finds for them. Masses are not the machine's: put its own in.
+
+    Args:
+        out: file to write.
+        gravity: with weight, by which the servos sag like springs.
+        force: replace a file that exists.
+    """
+    from gough.export.folder import write_file
+    from gough.export.mjcf import to_mjcf
+    from gough.platform import Platform
+
+    print(write_file(out, to_mjcf(Platform.load(platform), gravity), force))
+    return 0
+
+
+FORMATS = {"c": c, "mjcf": mjcf}

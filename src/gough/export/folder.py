@@ -32,3 +32,22 @@ def write_folder(folder: str | Path, files: dict[str, str], force: bool = False)
     for path, text in zip(paths, files.values(), strict=True):
         write_whole(path, text.encode())
     return paths
+
+
+def write_file(path: str | Path, text: str, force: bool = False) -> Path:
+    """Write one text to a file, in a folder that exists.
+
+    Args:
+        force: replace the file if it exists.
+
+    Returns:
+        The file's path.
+
+    Raises:
+        GoughError: the file exists and `force` is not given, or it cannot be written.
+    """
+    target = Path(path)
+    if target.exists() and not force:
+        raise GoughError(f"{path}: exists already; pass --force to replace it")
+    write_whole(target, text.encode())
+    return target
