@@ -36,9 +36,9 @@ def main() -> None:
         chosen = poses(model.platform, count, seed=1)
         solved = gough.solve(model.platform, gough.leg_lengths(model.platform, chosen)).pose
         started, errors = time.perf_counter(), []
-        for i, legs in enumerate(gough.leg_lengths(model.platform, chosen)):
-            model.settle(legs)
-            shift, turn = model.pose.distance(solved[i])
+        for pose, expected in zip(chosen, solved, strict=True):
+            model.go_to(pose)
+            shift, turn = model.pose.distance(expected)
             errors.append((shift / model.platform.size, np.degrees(turn)))
         shift, turn = np.max(errors, axis=0)
         took = time.perf_counter() - started

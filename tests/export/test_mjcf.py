@@ -15,6 +15,7 @@ import pytest
 import support
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from shell import run
 from support import Floats
 
@@ -37,12 +38,18 @@ class Model:
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         mujoco.mj_forward(self.model, self.data)
 
-    def settle(self, legs: Floats, ramp: int = 250) -> None:
-        """Drive the legs there in half a second, and step until nothing moves any more."""
-        start = self.data.ctrl.copy()
-        for step in range(1, ramp + 1):
-            self.data.ctrl[:] = start + (legs - start) * (step / ramp)
+    def go_to(self, pose: Pose, steps: int = 250) -> None:
+        """Drive the platform there in a straight line, in half a second, and let it come to rest.
+
+        A straight line of the readings may cross a singularity on the way.
+        """
+        for legs in gough.leg_lengths(self.platform, _straight(self.pose, pose, steps)):
+            self.data.ctrl[:] = legs
             mujoco.mj_step(self.model, self.data)
+        self.rest()
+
+    def rest(self) -> None:
+        """Step until nothing moves any more."""
         still = 1e-8 * self.platform.size
         for _ in range(100):
             mujoco.mj_step(self.model, self.data, nstep=100)
@@ -57,6 +64,15 @@ class Model:
     @property
     def pose(self) -> Pose:
         return Pose(self.data.sensordata[6:9], self.data.sensordata[9:13])
+
+
+def _straight(start: Pose, end: Pose, steps: int) -> Pose:
+    """Poses between two, the last of them `end`, with a position and a rotation in proportion."""
+    share = np.linspace(0, 1, steps + 1)[1:, None]
+    turned = start.as_scipy()
+    whole = (end.as_scipy() * turned.inv()).as_rotvec()
+    position = start.position + share * (end.position - start.position)
+    return Pose.from_scipy(position, Rotation.from_rotvec(share * whole) * turned)
 
 
 def poses(platform: Platform, count: int, seed: int = 0) -> Pose:
@@ -77,7 +93,7 @@ def test_the_steady_state_is_the_pose_that_gough_finds(name: str) -> None:
     model = Model(Platform.load(name))
     for expected in poses(model.platform, 2):
         legs = gough.leg_lengths(model.platform, expected)
-        model.settle(legs)
+        model.go_to(expected)
         np.testing.assert_allclose(model.readings, legs, atol=NEAR * model.platform.size)
         assert_same(model.platform, model.pose, gough.solve(model.platform, legs).pose)
         assert_same(model.platform, model.pose, expected)
@@ -91,15 +107,14 @@ def test_offset_gain_and_pivot_of_any_machine_are_in_the_model(seed: int, legs: 
     np.testing.assert_allclose(model.readings, platform.home_legs, rtol=1e-12)
     assert_same(platform, model.pose, platform.home)
     expected = poses(platform, 1, seed)[0]
-    model.settle(gough.leg_lengths(platform, expected))
+    model.go_to(expected)
     assert_same(platform, model.pose, expected)
 
 
 @pytest.mark.parametrize("name", ["reference", "reachy_mini"])
 def test_with_weight_the_servos_sag_and_the_readings_still_give_the_pose(name: str) -> None:
     model = Model(Platform.load(name), gravity=True)
-    home = model.platform.home_legs
-    model.settle(home)
+    model.rest()
     assert model.pose.position[2] < model.platform.home.position[2] - 1e-4 * model.platform.size
     assert_same(model.platform, model.pose, gough.solve(model.platform, model.readings).pose)
 
