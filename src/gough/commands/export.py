@@ -49,11 +49,11 @@ def c(
 def mjcf(
     *,
     platform: PlatformName,
-    out: Annotated[str, arg(aliases=["-o"], metavar="FILE.xml")],
-    gravity: Annotated[bool, arg(help_behavior_hint="")] = False,
-    force: Annotated[bool, arg(help_behavior_hint="")] = False,
+    out: Annotated[str, option(metavar="FILE.xml", aliases=["-o"])],
+    gravity: Annotated[bool, option()] = False,
+    force: Annotated[bool, option()] = False,
 ) -> int:
-    """A model for MuJoCo: legs, their closed loops, servos, sensors and a keyframe at home.
+    """Write a model for MuJoCo: legs, closed loops, servos, sensors and a keyframe at home.
 
     gough export mjcf -p rubin_camera -o rubin.xml
 
@@ -63,9 +63,9 @@ def mjcf(
     that gough solve finds for them. Masses are not the machine's: put its own in.
 
     Args:
-        out: file to write.
-        gravity: with weight, by which the servos sag like springs.
-        force: replace a file that exists.
+        out: Write this file.
+        gravity: Give the bodies weight, by which the servos sag as springs do.
+        force: Replace a file that exists.
     """
     from gough.export.folder import write_file
     from gough.export.mjcf import to_mjcf
