@@ -133,7 +133,7 @@ WRONG_TOML = {
     "unknown in a table": (TOML + "rotation = 3", "workspace.rotation: unknown field; did you"),
     "not a table": (
         "home = 3\n" + TOML.split("[home]")[0],
-        "home: expected a table with position, wxyz, euler_deg; found 3",
+        "home: expected a table with position, wxyz, euler_deg, order; found 3",
     ),
     "array of tables": (
         TOML.replace("[workspace]", "[[workspace]]"),

@@ -13,6 +13,8 @@ from .fk.solution import Solution as Solution
 from .fk.solve import Solver as Solver
 from .fk.solve import solve as solve
 from .fk.tracker import Tracker as Tracker
+from .frames import FramePose as FramePose
+from .frames import Frames as Frames
 from .kinematics import assembly_sign as assembly_sign
 from .kinematics import jacobian as jacobian
 from .kinematics import joint_positions as joint_positions

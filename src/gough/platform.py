@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough import limit_rules, struts
 from gough.checks import Array, frozen, one_or_six, platform_field, platform_numbers
 from gough.errors import PlatformError
+from gough.frames import FramePose, Frames, frame_pose
 from gough.pose import Pose
 from gough.rotary import RotaryArms
 from gough.text import page, vector
@@ -49,6 +51,7 @@ class Platform:
         pivot: (3,) point of the platform, in its own coordinates, that poses rotate about.
         workspace: the poses the machine is meant for.
         rotary: the motor arms, for rotary legs only.
+        frames: named frames, such as a tool on the platform and a work piece beside the base.
 
     Raises:
         PlatformError: naming the field, what was found and what was expected.
@@ -75,6 +78,7 @@ class Platform:
     rotary: RotaryArms | None
     offset: Array
     gain: Array
+    frames: Frames | None
 
     def __init__(
         self,
@@ -91,11 +95,12 @@ class Platform:
         rotary: RotaryArms | None = None,
         offset: ArrayLike = 0.0,
         gain: ArrayLike = 1.0,
+        frames: Frames | None = None,
     ) -> None:
         for field, text in (("unit", unit), ("name", name)):
             if not isinstance(text, str):
                 raise PlatformError(f"{field}: expected text, found {text!r}")
-        _check_kind(legs, workspace, rotary)
+        _check_parts(legs, workspace, rotary, frames)
         fields = {
             "base": _joints("base", base),
             "moving": _joints("moving", moving),
@@ -108,6 +113,7 @@ class Platform:
             "rotary": rotary,
             "offset": one_or_six("offset", offset),
             "gain": _nonzero("gain", one_or_six("gain", gain)),
+            "frames": frames,
         }
         for field, value in fields.items():
             object.__setattr__(self, field, value)
@@ -194,11 +200,13 @@ class Platform:
         for key, usual in (("offset", 0.0), ("gain", 1.0)):
             if np.any(getattr(self, key) != usual):
                 out[key] = getattr(self, key).tolist()
-        out["home"] = {"position": self.home.position.tolist(), "wxyz": self.home.wxyz.tolist()}
+        out["home"] = _pose_dict(self.home)
         for key in ("workspace", "rotary"):
             part = getattr(self, key)
             if part is not None:
                 out[key] = {k: _plain(k, v) for k, v in vars(part).items()}
+        if self.frames is not None:
+            out["frames"] = {name: _pose_dict(pose) for name, pose in self.frames.poses.items()}
         return out
 
     def with_workspace(self, translation: ArrayLike, rotation_deg: ArrayLike) -> Platform:
@@ -216,6 +224,40 @@ class Platform:
             raise PlatformError("pivot: a platform has a pivot or a moved origin, not both")
         home = Pose(self.home.apply(p), self.home.wxyz)
         return replace(self, moving=self.moving - p, home=home)
+
+    # ---- frames -----------------------------------------------------------------------
+
+    def with_frames(self, poses: Mapping[str, Pose | ArrayLike]) -> Platform:
+        """Copy with further named frames; see `gough.Frames`.
+
+        Args:
+            poses: the pose of frame A in frame B by the name "A_in_B"; a position (3,) stands for
+                no rotation. A name that is there already is replaced.
+
+        Raises:
+            PlatformError: a name of another form, or frames that do not hang together.
+        """
+        known = {} if self.frames is None else self.frames.poses
+        return replace(self, frames=Frames({**known, **poses}))
+
+    def frame(self, name: str) -> FramePose:
+        """Poses of a frame that moves with the platform in one that rests with the base.
+
+        Args:
+            name: such as "tool in work". Without frames of your own, tool is the platform, and
+                world and work are the base.
+
+        Raises:
+            GoughError: no such frames, or two that the legs do not move against each other.
+
+        Example:
+            >>> machine = gough.Platform.load("reference").with_frames(
+            ...     {"tool_in_platform": [0, 0, 120], "work_in_world": [0, 0, 600]}
+            ... )
+            >>> machine.frame("tool in work").of(machine.home).position - machine.home.position
+            array([   0.,    0., -480.])
+        """
+        return frame_pose(self.frames or Frames({}), self.pivot_point, name)
 
     # ---- workspace --------------------------------------------------------------------
 
@@ -353,12 +395,13 @@ class Platform:
         return notes
 
 
-def _check_kind(legs: str, workspace: object, rotary: object) -> None:
+def _check_parts(legs: str, workspace: object, rotary: object, frames: object) -> None:
     """Raise unless the kind of leg is known and the parts are what it needs."""
     if legs not in get_args(LegKind):
         kinds = ", ".join(get_args(LegKind))
         raise PlatformError(f"legs: expected one of {kinds}; found {legs!r}")
-    for name, kind, part in (("rotary", RotaryArms, rotary), ("workspace", Workspace, workspace)):
+    parts = (("rotary", RotaryArms, rotary), ("workspace", Workspace, workspace))
+    for name, kind, part in (*parts, ("frames", Frames, frames)):
         if part is not None and not isinstance(part, kind):
             raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
     if (legs == "rotary") != (rotary is not None):
@@ -371,6 +414,10 @@ def _nonzero(name: str, value: Array) -> Array:
         leg = int(np.argmin(np.abs(value)))
         raise PlatformError(f"{name}[{leg}]: expected a number other than 0, found 0.0")
     return value
+
+
+def _pose_dict(pose: Pose) -> dict[str, list]:
+    return {"position": pose.position.tolist(), "wxyz": pose.wxyz.tolist()}
 
 
 def _plain(key: str, value: Array) -> list | float:

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from gough import quaternion
 from gough.checks import platform_field
 from gough.errors import GoughError, PlatformError, suggestion
+from gough.frames import Frames
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -20,9 +22,10 @@ from gough.workspace import Workspace
 
 REQUIRED = ("base", "moving", "home")
 PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
-OPTIONAL = (*PLAIN, "workspace", "rotary", "readings")  # readings: see files.log_format
+OPTIONAL = (*PLAIN, "workspace", "rotary", "frames", "readings")  # readings: see files.log_format
+POSE = ("position", "wxyz", "euler_deg", "order")
 TABLES = {
-    "home": ("position", "wxyz", "euler_deg"),
+    "home": POSE,
     "workspace": ("translation", "rotation_deg"),
     "rotary": ("arm_length", "rod_length", "axis_x", "axis_y", "branch"),
 }
@@ -119,9 +122,10 @@ def _from_dict(facts: dict) -> Platform:
     return Platform(
         facts["base"],
         facts["moving"],
-        _home(facts["home"]),
+        _pose("home", facts["home"]),
         workspace=_table(Workspace, "workspace", facts),
         rotary=_table(RotaryArms, "rotary", facts),
+        frames=_frames(facts["frames"]) if "frames" in facts else None,
         **options,
     )
 
@@ -136,20 +140,41 @@ def _table(kind, name: str, facts: dict):
     return kind(**facts[name])
 
 
-def _home(table: dict) -> Pose:
+def _frames(table: object) -> Frames:
+    if not isinstance(table, dict):
+        raise PlatformError(f"frames: expected a table of poses, found {table!r}")
+    for key, pose in table.items():
+        if not isinstance(pose, dict):
+            raise PlatformError(
+                f"frames.{key}: expected a pose such as {{position = [0, 0, 120], "
+                f"euler_deg = [0, 0, 90]}}, found {pose!r}"
+            )
+        _known(f"frames.{key}.", pose, POSE)
+    return Frames({key: _pose(f"frames.{key}", pose) for key, pose in table.items()})
+
+
+def _pose(where: str, table: dict) -> Pose:
+    """Pose of a table with position and wxyz, or euler_deg and the order of its axes."""
     if "position" not in table:
-        raise PlatformError("home.position: missing; expected [x, y, z]")
-    position = platform_field("home.position", table["position"], (3,))
+        raise PlatformError(f"{where}.position: missing; expected [x, y, z]")
+    position = platform_field(f"{where}.position", table["position"], (3,))
     if "wxyz" in table and "euler_deg" in table:
-        raise PlatformError("home: give wxyz or euler_deg, not both")
-    if "euler_deg" in table:
-        angles = platform_field("home.euler_deg", table["euler_deg"], (3,))
-        return Pose.from_euler(position, np.radians(angles))
-    wxyz = platform_field("home.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,))
+        raise PlatformError(f"{where}: give wxyz or euler_deg, not both")
+    if "order" in table and "euler_deg" not in table:
+        raise PlatformError(f"{where}.order: states the axes of euler_deg, which is missing")
     try:
+        if "euler_deg" in table:
+            angles = platform_field(f"{where}.euler_deg", table["euler_deg"], (3,))
+            if "order" not in table:
+                return Pose.from_euler(position, np.radians(angles))
+            wxyz = quaternion.from_axes(np.radians(angles), table["order"])
+        else:
+            wxyz = platform_field(f"{where}.wxyz", table.get("wxyz", [1, 0, 0, 0]), (4,))
         return Pose(position, wxyz)
+    except PlatformError:
+        raise
     except GoughError as error:
-        raise PlatformError(f"home.{error}") from None
+        raise PlatformError(f"{where}.{error}") from None
 
 
 def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:
@@ -166,6 +191,8 @@ def _value(value: object) -> str:
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list) and value and isinstance(value[0], list):
         return "[\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k} = {_value(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(repr(float(v)) for v in value) + "]"
     return repr(value)

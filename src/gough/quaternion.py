@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.errors import GoughError
 
 SERIES_ANGLE = 0.3  # [rad] below it, series whose first dropped term is under 1e-15
 
@@ -92,6 +93,32 @@ def from_euler(angles: Array) -> Array:
     y = ca * sb * cc - sa * cb * sc
     z = ca * cb * sc + sa * sb * cc
     return np.stack([w, x, y, z], axis=-1)
+
+
+def from_axes(angles: Array, order: str) -> Array:
+    """Unit quaternions (..., 4) of angles (..., 3) [rad] about three axes, one after the other.
+
+    Args:
+        order: three axes, "XYZ" or "ZYX" about those of the rotated frame (R = Rx Ry Rz for
+            "XYZ"), or "xyz" about those at rest (R = Rz Ry Rx for "xyz").
+
+    Raises:
+        GoughError: another order, or the same axis twice in a row.
+    """
+    axes = order.lower() if isinstance(order, str) else ""
+    known = len(axes) == 3 and set(axes) <= set("xyz") and order in (axes, axes.upper())
+    if not known or axes[0] == axes[1] or axes[1] == axes[2]:
+        raise GoughError(
+            f"order: expected three axes such as 'XYZ' (about axes that turn along) or 'xyz' "
+            f"(about axes at rest), found {order!r}"
+        )
+    first, second, third = (
+        from_rotation_vector(angles[..., i : i + 1] * np.eye(3)["xyz".index(axis)])
+        for i, axis in enumerate(axes)
+    )
+    if order == axes:
+        first, third = third, first
+    return product(product(first, second), third)
 
 
 def to_euler(wxyz: Array) -> Array:

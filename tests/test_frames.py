@@ -1,0 +1,169 @@
+"""Poses of frames in frames: against SciPy's composition, and as they stand in files."""
+
+from __future__ import annotations
+
+import machines
+import numpy as np
+import pytest
+import support
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import RigidTransform, Rotation
+from support import Floats
+
+import gough
+from gough import Frames, GoughError, Platform, PlatformError, Pose, quaternion
+from gough.platform_file import from_toml
+
+ORDERS = st.permutations("xyz").map("".join)
+
+
+def random_pose(rng: np.random.Generator, batch: tuple[int, ...] = ()) -> Pose:
+    return Pose(rng.normal(size=(*batch, 3)), rng.normal(size=(*batch, 4)))
+
+
+def rigid(pose: Pose) -> RigidTransform:
+    return RigidTransform.from_components(pose.position, pose.as_scipy())
+
+
+def machine(seed: int) -> tuple[Platform, dict[str, Pose]]:
+    """A platform with six frames, in any order."""
+    rng = np.random.default_rng(seed)
+    names = ["base_in_world", "tool_in_platform", "work_in_world", "jig_in_work", "tip_in_tool"]
+    names += ["room_in_jig"]
+    rng.shuffle(names)
+    poses = {name: random_pose(rng) for name in names}
+    return machines.random_platform(seed).with_frames(poses), poses
+
+
+@given(support.seeds)
+def test_a_chain_is_that_of_scipy(seed: int) -> None:
+    platform, poses = machine(seed)
+    pose = random_pose(np.random.default_rng(seed + 1), (50,))
+    frames = {name: rigid(p) for name, p in poses.items()}
+    about = RigidTransform.from_translation(platform.pivot_point)
+    hexapod = about * rigid(pose) * about.inv()
+    room = frames["work_in_world"] * frames["jig_in_work"] * frames["room_in_jig"]
+    tip = frames["tool_in_platform"] * frames["tip_in_tool"]
+    expected = (room.inv() * frames["base_in_world"] * hexapod * tip).as_matrix()
+    view = platform.frame("tip in room")
+    scale = 1 + np.abs(expected).max()
+    np.testing.assert_allclose(view.of(pose).matrix, expected, rtol=0, atol=1e-14 * scale)
+    back = view.platform_pose(view.of(pose))
+    shift, turn = back.distance(pose)
+    assert np.max(shift) <= 1e-13 * scale
+    assert np.max(turn) <= 1e-14
+
+
+@given(support.seeds)
+def test_the_twist_of_a_frame_is_the_derivative_of_its_pose(seed: int) -> None:
+    platform, _ = machine(seed)
+    view, pose = platform.frame("tip in room"), platform.home
+    twist = np.random.default_rng(seed).normal(size=6) * np.repeat([platform.size, 1.0], 3)
+    step = 1e-5
+    ahead, behind = (view.of(support.moved(pose, sign * step * twist)) for sign in (1, -1))
+    velocity = (ahead.position - behind.position) / (2 * step)
+    spin = (ahead.as_scipy() * behind.as_scipy().inv()).as_rotvec() / (2 * step)
+    found = view.twist_matrix(pose) @ twist
+    scale = 1 + np.abs(found).max()
+    np.testing.assert_allclose(found, np.concatenate([velocity, spin]), rtol=0, atol=1e-7 * scale)
+
+
+def test_an_origin_at_a_point_is_a_tool_there() -> None:
+    platform, point = Platform.load("reference"), np.array([10.0, -20.0, 120.0])
+    poses = platform.sample_poses(20)
+    moved = platform.with_origin_at(point)
+    found = platform.with_frames({"tool_in_platform": point}).frame("tool in base").of(poses)
+    legs = gough.leg_lengths(platform, poses)
+    np.testing.assert_allclose(gough.leg_lengths(moved, found), legs, rtol=1e-14)
+
+
+def test_without_frames_the_tool_is_the_platform_and_work_is_the_base() -> None:
+    platform = Platform.load("rubin_camera")
+    pose = platform.sample_poses(5)
+    shift, turn = platform.frame("tool in work").of(pose).distance(Pose(pose.position, pose.wxyz))
+    pivot_moves = np.linalg.norm(
+        platform.pivot_point - pose.rotation @ platform.pivot_point, axis=-1
+    )
+    np.testing.assert_allclose(shift, pivot_moves, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(turn, 0, atol=1e-15)
+
+
+# ---- files ----------------------------------------------------------------------------
+
+
+@given(support.seeds)
+def test_frames_survive_a_file(seed: int) -> None:
+    platform, _ = machine(seed)
+    again = from_toml(platform.to_toml())
+    assert again == platform
+    assert again.digest == platform.digest
+    assert again.frames is not None
+    assert list(again.frames.poses) == list(platform.frames.poses)  # pyright: ignore
+
+
+@given(ORDERS, st.booleans(), support.seeds)
+def test_angles_about_any_axes_are_those_of_scipy(order: str, turning: bool, seed: int) -> None:
+    order = order.upper() if turning else order
+    angles = np.random.default_rng(seed).uniform(-3, 3, (10, 3))
+    found: Floats = quaternion.to_matrix(quaternion.from_axes(angles, order))
+    np.testing.assert_allclose(
+        found, Rotation.from_euler(order, angles).as_matrix(), atol=4e-16 * 4
+    )
+
+
+def test_a_file_may_state_angles_and_their_order() -> None:
+    text = Platform.load("reference").to_toml()
+    pose = '{position = [0, 0, 120], euler_deg = [90, 0, 30], order = "zyx"}'
+    text += f"[frames]\ntool_in_platform = {pose}\n"
+    frames = from_toml(text).frames
+    assert frames is not None
+    expected = Rotation.from_euler("zyx", [90, 0, 30], degrees=True).as_matrix()
+    np.testing.assert_allclose(frames.moving["tool"].rotation, expected, atol=1e-15)
+
+
+def test_a_platform_without_frames_keeps_its_digest() -> None:
+    platform = Platform.load("reference")
+    assert "frames" not in platform.to_dict()
+    assert platform.with_frames({"tool_in_platform": [0, 0, 1]}).digest != platform.digest
+
+
+@pytest.mark.parametrize(
+    ("frames", "said"),
+    [
+        ({"tool": [0, 0, 1]}, "frames.tool: expected a name such as tool_in_platform"),
+        ({"tool_in_platfrm": [0, 0, 1]}, "hangs on neither base nor platform"),
+        ({"world_in_platform": [0, 0, 1]}, "hangs on both base and platform"),
+        ({"a_in_base": [0, 0, 1], "a_in_world": [0, 0, 1]}, "follows from the other frames"),
+        ({"tool_in_platform": [0, 0]}, "frames.tool_in_platform: expected 3 numbers"),
+        ({"tool_in_platform": [0, 0, np.nan]}, "frames.tool_in_platform"),
+        ({"tool_in_platform": Pose.identity((2,))}, "expected one pose"),
+    ],
+)
+def test_wrong_frames_are_refused_by_name(frames: dict, said: str) -> None:
+    with pytest.raises(PlatformError, match=said):
+        Frames(frames)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("tool_in_platform = [0, 0, 1]", "expected a pose such as"),
+        ("tool_in_platform = {positon = [0, 0, 1]}", "positon: unknown field; did you mean"),
+        ("tool_in_platform = {wxyz = [1, 0, 0, 0]}", "tool_in_platform.position: missing"),
+        ("tool_in_platform = {position = [0, 0, 1], order = 'xyz'}", "order: states the axes"),
+        (
+            "tool_in_platform = {position = [0, 0, 1], euler_deg = [1, 2, 3], order = 'xYz'}",
+            "tool_in_platform.order: expected three axes",
+        ),
+    ],
+)
+def test_wrong_frames_of_a_file_are_refused_by_field(line: str, said: str) -> None:
+    with pytest.raises(PlatformError, match=said):
+        from_toml(f"{Platform.load('reference').to_toml()}[frames]\n{line}\n")
+
+
+@pytest.mark.parametrize("name", ["tool", "tol in work", "work in tool", "tool in platform", ""])
+def test_a_name_that_no_frame_has_lists_those_there_are(name: str) -> None:
+    with pytest.raises(GoughError, match=r"expected a name such as 'tool in work'.* frames that"):
+        Platform.load("reference").frame(name)
