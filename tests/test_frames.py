@@ -13,6 +13,7 @@ from support import Floats
 
 import gough
 from gough import Frames, GoughError, Platform, PlatformError, Pose, quaternion
+from gough.export.linuxcnc import in_unit
 from gough.platform_file import from_toml
 
 ORDERS = st.permutations("xyz").map("".join)
@@ -76,6 +77,20 @@ def test_an_origin_at_a_point_is_a_tool_there() -> None:
     found = platform.with_frames({"tool_in_platform": point}).frame("tool in base").of(poses)
     legs = gough.leg_lengths(platform, poses)
     np.testing.assert_allclose(gough.leg_lengths(moved, found), legs, rtol=1e-14)
+
+
+def test_frames_are_converted_to_another_unit_with_the_machine() -> None:
+    platform = Platform.load("reference").with_frames({"tool_in_platform": [0, 0, 120]})
+    metres = in_unit(platform, "m")
+    found = metres.frame("tool in base").of(metres.home).position
+    expected = platform.frame("tool in base").of(platform.home).position
+    np.testing.assert_allclose(1000 * found, expected, rtol=1e-15)
+
+
+def test_frames_and_a_moved_origin_are_not_mixed() -> None:
+    platform = Platform.load("reference").with_frames({"tool_in_platform": [0, 0, 120]})
+    with pytest.raises(PlatformError, match="frames: state the point as a frame"):
+        platform.with_origin_at([0, 0, 120])
 
 
 def test_without_frames_the_tool_is_the_platform_and_work_is_the_base() -> None:

@@ -79,6 +79,10 @@ class Frames:
         for field, value in (("poses", stated), ("moving", moving), ("at_rest", at_rest)):
             object.__setattr__(self, field, value)
 
+    def scaled(self, factor: float) -> Frames:
+        """Return the same frames with lengths in a unit of which `factor` are one of now."""
+        return Frames({k: Pose(factor * p.position, p.wxyz) for k, p in self.poses.items()})
+
 
 @dataclass(frozen=True, eq=False)
 class FramePose:

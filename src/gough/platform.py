@@ -222,6 +222,8 @@ class Platform:
         p = platform_field("point", point, (3,))
         if self.pivot is not None:
             raise PlatformError("pivot: a platform has a pivot or a moved origin, not both")
+        if self.frames is not None:
+            raise PlatformError("frames: state the point as a frame, such as tool_in_platform")
         home = Pose(self.home.apply(p), self.home.wxyz)
         return replace(self, moving=self.moving - p, home=home)
 

@@ -82,4 +82,5 @@ def in_unit(platform: Platform, unit: str) -> Platform:
         offset=platform.offset if arms is not None else factor * platform.offset,
         workspace=None if box is None else replace(box, translation=factor * box.translation),
         rotary=arms,
+        frames=platform.frames and platform.frames.scaled(factor),
     )
