@@ -136,32 +136,6 @@ def with_some_workspace(platform: Platform) -> Platform:
 # ---- the same platform seen otherwise -------------------------------------------------
 
 
-def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
-    """The same machine with its lengths in another unit."""
-    arms, space, stroke = platform.rotary, platform.workspace, platform.stroke
-    if arms is not None:
-        arms = replace(
-            arms, arm_length=factor * arms.arm_length, rod_length=factor * arms.rod_length
-        )
-    if space is not None:
-        space = replace(space, translation=factor * space.translation)
-    along = 1.0 if platform.legs == "rotary" else factor
-    if stroke is not None:
-        stroke = along * stroke
-    return replace(
-        platform,
-        base=factor * platform.base,
-        moving=factor * platform.moving,
-        home=Pose(factor * platform.home.position, platform.home.wxyz),
-        pivot=None if platform.pivot is None else factor * platform.pivot,
-        unit=unit,
-        stroke=stroke,
-        offset=along * platform.offset,
-        workspace=space,
-        rotary=arms,
-    )
-
-
 def permuted(platform: Platform, order: NDArray[np.intp]) -> Platform:
     """The same machine with its legs numbered in another order."""
     arms = platform.rotary

@@ -14,6 +14,7 @@ from support import Floats, reading_scale, unitless
 
 import gough
 from gough import Platform, Pose, Status, jacobian, leg_lengths, quaternion, singularity_distance
+from gough.units import scaled
 
 few = settings(max_examples=15)
 
@@ -61,7 +62,7 @@ UNITS = {"mm": 1e3, "inch": 1 / 0.0254, "km": 1e-3, "astronomical": 1e-20, "nucl
 @pytest.mark.parametrize("unit", UNITS)
 def test_the_unit_changes_no_digit_beyond_rounding(name: str, unit: str) -> None:
     platform, factor = Platform.load(name), UNITS[unit]
-    other = machines.scaled(platform, factor, unit)
+    other = scaled(platform, factor, unit)
     poses = support.sample(platform, (30,))
     there = Pose(factor * poses.position, poses.wxyz)
     assert np.all(other.in_workspace(there))
@@ -118,7 +119,7 @@ def _assert_same_machine(a: Platform, pose_a: Pose, b: Platform, pose_b: Pose) -
 @given(support.seeds, st.sampled_from([1e-3, 1 / 25.4, 1e3]))
 def test_solve_gives_the_same_poses_in_another_unit(seed: int, scale: float) -> None:
     one = machines.regular_platform(seed)
-    other = machines.scaled(one, scale)
+    other = scaled(one, scale)
     legs = leg_lengths(one, one.sample_poses(50, seed=1))
     a, b = gough.solve(one, legs), gough.solve(other, legs * scale)
     np.testing.assert_array_equal(a.status, b.status)
@@ -202,9 +203,9 @@ def test_modes_do_not_depend_on_the_order_of_legs(seed, order):
 @given(st.integers(0, 10**6), st.sampled_from([1e-6, 1e-3, 1e3, 1e6]))
 def test_modes_scale_with_the_unit_of_length(seed, unit):
     platform = machines.general_platform(seed)
-    scaled = machines.scaled(platform, unit)
+    other_unit = scaled(platform, unit)
     modes = gough.assembly_modes(platform, platform.home_legs)
-    other = gough.assembly_modes(scaled, platform.home_legs * unit)
+    other = gough.assembly_modes(other_unit, platform.home_legs * unit)
     assert same(modes, other, Pose(modes.pose.position * unit, modes.pose.wxyz))
     assert np.allclose(other.certificate.radius, modes.certificate.radius * unit, rtol=1e-6)
 

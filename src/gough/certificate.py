@@ -77,13 +77,13 @@ class Certificate:
         return f"Certificate({count} certified{smallest})"
 
     def _repr_html_(self) -> str:
-        from gough.text import length_head, number, page, rows_of
+        from gough.text import number, page, rows_of, with_unit
 
         def cells(i: tuple[int, ...]) -> list[str]:
             at = self[i]
             return ["yes" if at.certified else "no", number(at.radius), number(at.error, ".2g")]
 
-        heads = ["", "certified", length_head("radius", self.unit), length_head("error", self.unit)]
+        heads = ["", "certified", with_unit("radius", self.unit), with_unit("error", self.unit)]
         return page(repr(self), heads, rows_of(np.shape(self.certified), cells))
 
 

@@ -368,21 +368,21 @@ def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Calla
 
 
 def pose_values(pose: Pose, angles: Angles | None) -> Array:
-    """Values of the columns `pose_names(angles)`, (N, 7) or (N, 6), batch axes flattened."""
-    names = pose_names(angles)
+    """Values of the columns `pose_names(angles)`, (..., 7) or (..., 6)."""
     rotation = pose.wxyz if angles is None else pose.euler
     if angles == "deg":
         rotation = np.degrees(rotation)
-    return np.concatenate([pose.position, rotation], axis=-1).reshape(-1, len(names))
+    return np.concatenate([pose.position, rotation], axis=-1)
 
 
 def pose_table(pose: Pose, angles: Angles | None) -> dict[str, pa.Array]:
     """Columns of poses by name, batch axes flattened."""
-    columns = map(tables.number_column, pose_values(pose, angles).T)
-    return dict(zip(pose_names(angles), columns, strict=True))
+    names = pose_names(angles)
+    columns = pose_values(pose, angles).reshape(-1, len(names)).T
+    return dict(zip(names, map(tables.number_column, columns), strict=True))
 
 
 def pose_cells(pose: Pose) -> list[str]:
     """Position and Euler angles of one pose as text, R = Rx Ry Rz, the angles in degrees."""
-    numbers = [number(v, ".7g") for v in pose.position]
-    return numbers + [number(v, ".4f") for v in np.degrees(pose.euler)]
+    digits = (".7g", ".7g", ".7g", ".4f", ".4f", ".4f")
+    return list(map(number, pose_values(pose, "deg"), digits))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from itertools import chain
@@ -40,15 +41,18 @@ def rows_of(batch: tuple[int, ...], cells: Callable[[tuple[int, ...]], list[str]
 
 def pose_heads(batch: tuple[int, ...], unit: str) -> list[str]:
     """Column heads of a table of poses: its index, then those of `gough.pose.pose_cells`."""
-    return ["row" if batch else "", *(length_head(axis, unit) for axis in "xyz"), *TURNS]
+    units = (unit, unit, unit, "deg", "deg", "deg")
+    return ["row" if batch else "", *map(with_unit, ("x", "y", "z", "rx", "ry", "rz"), units)]
 
 
-TURNS = ("rx [deg]", "ry [deg]", "rz [deg]")
-
-
-def length_head(name: str, unit: str) -> str:
-    """Column head with its unit of length."""
+def with_unit(name: str, unit: str) -> str:
+    """A name and its unit in brackets, if it has one."""
     return f"{name} [{unit}]" if unit else name
+
+
+def decimals(size: float, digits: int) -> int:
+    """Digits after the point that show the first `digits` digits of numbers as large as `size`."""
+    return max(0, digits - 1 - math.floor(math.log10(size)))
 
 
 def number(value: ArrayLike, digits: str = ".4g") -> str:

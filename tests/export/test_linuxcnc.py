@@ -25,7 +25,8 @@ from hypothesis import given, settings
 
 import gough
 from gough import GoughError, Platform, Pose, Status
-from gough.export.linuxcnc import in_unit, linuxcnc_files
+from gough.export.linuxcnc import linuxcnc_files
+from gough.units import in_unit
 
 HERE = Path(exported.__file__).parent
 MODULES = Path("/usr/lib/linuxcnc/modules")

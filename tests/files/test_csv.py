@@ -14,15 +14,17 @@ from hypothesis import strategies as st
 from gough.columns import LEGS
 from gough.errors import InputError
 from gough.files.csv import CsvSink, CsvSource
+from gough.files.rows import Reading
 
 from .conftest import csv_text
 
 HEADER = b"time," + ",".join(LEGS).encode() + b"\n"
 
 
-def read(data: bytes, rows: int = 64, keep: tuple[str, ...] = (), **options) -> list:
-    source = CsvSource(io.BytesIO(data), "legs.csv", len(data))
-    return list(source.blocks(LEGS, keep, rows=rows, **options))
+def read(data: bytes, rows: int = 64, keep: tuple[str, ...] = (), typed=False, **options) -> list:
+    reading = Reading(block_rows=rows, **options)
+    source = CsvSource(io.BytesIO(data), "legs.csv", len(data), reading)
+    return list(source.blocks(LEGS, keep, typed=typed))
 
 
 def numbers(data: bytes, **options) -> np.ndarray:
@@ -100,7 +102,7 @@ def test_the_line_is_right_after_blank_lines_and_lines_within_quotes():
 def test_bad_rows_can_be_kept_and_their_neighbours_are_read(readings):
     lines = csv_text(readings).split(b"\n")
     lines[11], lines[21] = b"10,1,2,x,4,5,6", b"20,1"
-    blocks = read(b"\n".join(lines), rows=1000, keep=("time",), keep_bad=True)
+    blocks = read(b"\n".join(lines), rows=1000, keep=("time",), keep_bad_rows=True)
     assert sum(map(len, blocks)) == len(readings)
     assert list(blocks[0].bad) == [10, 20]
     assert [blocks[0].place(i) for i in (10, 20)] == ["line 12", "line 22"]

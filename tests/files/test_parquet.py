@@ -13,7 +13,7 @@ import pytest
 from gough.columns import LEGS
 from gough.errors import InputError
 from gough.files.formats import open_source
-from gough.files.rows import Block
+from gough.files.rows import Block, Reading
 
 from .conftest import parquet_table
 
@@ -23,8 +23,8 @@ def numbers(path: Path, rows: int = 50) -> np.ndarray:
 
 
 def blocks(path: Path, rows: int) -> list[Block]:
-    with closing(open_source(path)) as source:
-        return list(source.blocks(LEGS, rows=rows))
+    with closing(open_source(path, reading=Reading(block_rows=rows))) as source:
+        return list(source.blocks(LEGS))
 
 
 def write(path: Path, table: pa.Table) -> Path:

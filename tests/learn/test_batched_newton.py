@@ -11,7 +11,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from learn.networks import reference
-from machines import scaled, with_some_workspace
+from machines import with_some_workspace
 from support import angles, random_platforms, random_twists, seeds
 
 import gough
@@ -20,6 +20,7 @@ from gough.kinematics import equivalent_struts
 from gough.learn.kinematics import TorchPlatform, se3_exp, se3_exp_jacobian
 from gough.learn.newton import BatchedSolution, batched_newton, refine
 from gough.status import NewtonStatus
+from gough.units import scaled
 
 
 def problem(platform: Platform, count: int = 50, seed: int = 1, off: float = 1e-3):

@@ -30,7 +30,7 @@ TOLERANCE: dict[str, Any] = {"eps": 1e-6, "atol": 1e-4, "rtol": 1e-4}
 
 def of_one_size(platform: Platform) -> Platform:
     """In a unit that is the machine's size, so that one finite difference suits all arguments."""
-    from machines import scaled
+    from gough.units import scaled
 
     return scaled(with_some_workspace(platform), 1 / platform.size)
 

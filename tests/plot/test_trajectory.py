@@ -73,7 +73,7 @@ def test_a_file_of_legs_gives_the_poses_that_they_have(tmp_path, name):
     pose = platform.sample_poses(30, seed=2)
     legs = gough.leg_lengths(platform, pose)
     envelope = read_trajectory(legs_file(tmp_path, platform, legs), platform)
-    expected = signals(platform, legs, pose.position, pose.euler)
+    expected = signals(platform, legs, pose)
     size = np.repeat([platform.size, 180.0], [9, 3])
     assert np.all(np.abs(envelope.low - expected) < 1e-9 * size)
     np.testing.assert_array_equal(envelope.x, np.arange(1, 31))
@@ -172,7 +172,7 @@ def envelope_of(values: np.ndarray, bins: int = 1000) -> Envelope:
 def test_curves_are_the_signals_and_axes_have_units(name):
     platform = gough.Platform.load(name)
     pose = platform.sample_poses(15, seed=1)
-    values = signals(platform, gough.leg_lengths(platform, pose), pose.position, pose.euler)
+    values = signals(platform, gough.leg_lengths(platform, pose), pose)
     figure = trajectory_figure(platform, envelope_of(values))
     legs, position, angles = figure.axes
     for axes, part in ((legs, values[:, :6]), (angles, values[:, 9:])):
@@ -191,11 +191,11 @@ def test_curves_are_the_signals_and_axes_have_units(name):
 def test_stroke_limits_are_lines_where_they_are_near_and_words_where_they_are_far():
     platform = gough.Platform.load("nasa_msfc")
     pose = platform.sample_poses(50, seed=1)
-    values = signals(platform, gough.leg_lengths(platform, pose), pose.position, pose.euler)
+    values = signals(platform, gough.leg_lengths(platform, pose), pose)
     legs = trajectory_figure(platform, envelope_of(values)).axes[0]
     lines = [line for line in legs.get_lines() if len(np.atleast_1d(line.get_xdata())) == 2]
     assert [float(np.asarray(line.get_ydata())[0]) for line in lines] == [106, 167]
-    home = signals(platform, platform.home_legs[None], np.zeros((1, 3)), np.zeros((1, 3)))
+    home = signals(platform, platform.home_legs[None], gough.Pose.identity((1,)))
     still = home + 1e-3 * np.random.default_rng(0).random((50, 12))
     legs = trajectory_figure(platform, envelope_of(still)).axes[0]
     assert [t.get_text() for t in legs.texts] == [

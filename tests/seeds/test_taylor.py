@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import permuted, random_platform, scaled
+from machines import permuted, random_platform
 from support import moved, random_platforms
 
 import gough
 from gough.seeds.base import find_seed
 from gough.seeds.taylor import TaylorSeed
+from gough.units import scaled
 
 few = settings(max_examples=20, deadline=None)
 ORDERS = (1, 2, 3, 4)

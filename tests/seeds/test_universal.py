@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import permuted, random_platform, scaled
+from machines import permuted, random_platform
 
 import gough
 from gough.seeds.base import find_seed
 from gough.seeds.network import seal
 from gough.seeds.taylor import HomeStruts
 from gough.seeds.universal import UniversalSeed
+from gough.units import scaled
 
 few = settings(max_examples=12, deadline=None)
 seeds = st.integers(0, 10**6)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from machines import random_platform, scaled
+from machines import random_platform
 
 import gough
 from gough import Platform
+from gough.units import scaled
 from gough.view import meshes
 from gough.view.scene import Scene, close_server, open_server
 

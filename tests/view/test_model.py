@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from machines import scaled
 
 import gough
 from gough import Platform, Pose
+from gough.pose import pose_values
 from gough.skeleton import outside_stroke
+from gough.units import scaled
 from gough.view import meshes
-from gough.view.follow import BLOCKED, REFUSED, follow, has_pose
-from gough.view.model import UNCHANGED, Answer, Model, leg_factor, pose_numbers
+from gough.view.follow import BLOCKED, REFUSED, follow, has_pose, step_solver
+from gough.view.model import UNCHANGED, Answer, Model, leg_factor
 from gough.view.panel import leg_ranges, pose_ranges
 
 CATALOG = Platform.catalog()
@@ -43,7 +44,7 @@ def test_pose_sliders_move_the_legs_and_leg_sliders_bring_the_pose(platform):
     pose = platform.sample_poses(5, seed=3)[2]
     legs = gough.leg_lengths(platform, pose)
     model = Model(platform)
-    model.ask_numbers(dict(enumerate(pose_numbers(pose))))
+    model.ask_numbers(dict(enumerate(pose_values(pose, "deg"))))
     np.testing.assert_allclose(model.legs, legs, rtol=0, atol=1e-12 * platform.size)
     assert (model.answer.how, model.answer.iterations) == ("inverse kinematics", 0)
 
@@ -103,9 +104,10 @@ def test_a_long_step_ends_where_many_short_ones_do():
     """Newton's method alone goes to another mode for some of these."""
     platform = Platform.load("reference").with_workspace(100, 60)
     targets = gough.leg_lengths(platform, platform.sample_poses(60, seed=5))
+    solver = step_solver(platform)
     jumps = arrivals = 0
     for target in targets:
-        found = follow(platform, platform.home, platform.home_legs, target)
+        found = follow(solver, platform.home, platform.home_legs, target)
         alone = gough.solve(platform, target, seed=platform.home, restarts=0)
         if found.pose is None:
             assert found.text == BLOCKED
@@ -115,7 +117,7 @@ def test_a_long_step_ends_where_many_short_ones_do():
         legs, pose = platform.home_legs, platform.home
         for share in np.linspace(0, 1, 101)[1:]:
             way = platform.home_legs + share * (target - platform.home_legs)
-            step = follow(platform, pose, legs, way)
+            step = follow(solver, pose, legs, way)
             assert step.pose is not None
             pose, legs = step.pose, way
         assert_near(found.pose, pose, platform.size, 1e-7)
@@ -171,7 +173,7 @@ def test_impossible_legs_leave_the_picture_and_say_why(platform):
     assert model.answer.text.startswith((REFUSED["unreachable"], BLOCKED))
     # the leg sliders show the request, all else the picture
     assert model.asked[2] == far
-    np.testing.assert_array_equal(model.numbers, pose_numbers(pose))
+    np.testing.assert_array_equal(model.numbers, pose_values(pose, "deg"))
     # and dragging back leads on from the picture
     model.ask_legs({2: float(legs[2])})
     assert model.answer.reached
@@ -187,7 +189,7 @@ def test_a_pose_beyond_the_motors_names_them():
     assert "too short for this pose: motor 1, 2, 3, 4, 5, 6" in model.answer.text
     assert model.numbers[2] == 0.4
     model.undo()
-    np.testing.assert_array_equal(model.numbers, pose_numbers(platform.home))
+    np.testing.assert_array_equal(model.numbers, pose_values(platform.home, "deg"))
 
 
 def test_a_leg_without_length_is_no_picture():
@@ -257,7 +259,7 @@ def test_sliders_hold_home_stroke_and_workspace(platform):
     if platform.stroke is not None:
         for one, (low, high) in zip(legs, factor * platform.stroke, strict=True):
             assert one.low < low < high < one.high
-    poses = pose_numbers(platform.sample_poses(200, seed=1))
+    poses = pose_values(platform.sample_poses(200, seed=1), "deg")
     for i, one in enumerate(pose_ranges(platform)):
         if i < 3 or platform.home.wxyz[0] == 1:  # angles of a turned home are not the box's
             assert one.low <= poses[:, i].min()

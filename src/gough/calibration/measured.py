@@ -22,7 +22,7 @@ from gough.columns import (
     rotation_columns,
 )
 from gough.errors import GoughError, InputError
-from gough.files import Reading, open_source
+from gough.files import open_source
 from gough.platform import Platform
 from gough.pose import poses_from_columns
 
@@ -91,7 +91,7 @@ def read_measured(
         names = _columns(source.where, kind, found)
         extra = _noise_columns(source.where, kind, found, sigma) + ([time] if time else [])
         checked(source.where, found, extra)
-        blocks = list(source.blocks([*legs, *names, *extra], rows=Reading().block_rows))
+        blocks = list(source.blocks([*legs, *names, *extra]))
     values = np.concatenate([block.numbers([*LEGS, *names, *extra]) for block in blocks])
     starts = np.cumsum([0, *(len(block) for block in blocks)])
 

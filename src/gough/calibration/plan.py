@@ -39,8 +39,8 @@ from gough.errors import GoughError
 from gough.kinematics import joint_radius, leg_lengths
 from gough.platform import Platform
 from gough.pose import Pose
+from gough.units import LENGTHS
 
-MILLIMETRE = {"mm": 1.0, "m": 1e-3, "cm": 0.1, "inch": 1 / 25.4, "in": 1 / 25.4, "um": 1e3}
 INSTRUMENTS = {"tracker": (0.01, 0.002), "camera": (0.1, 0.05)}  # [mm], [deg]
 CANDIDATES = 500  # poses to choose from: half from the box, half at its corners and faces
 SWEEPS = 2  # of exchanging each pose for a better one
@@ -120,7 +120,7 @@ def _stated(
     tolerance: float | None,
 ) -> tuple[Any, float, float]:  # fmt: skip
     """Noise of the instrument and of the readings, and the tolerance, stated or usual."""
-    unit = MILLIMETRE.get(platform.unit)
+    unit = LENGTHS["mm"] / LENGTHS[platform.unit] if platform.unit in LENGTHS else None
     rotary = platform.rotary is not None
     if unit is None and (sigma is None or tolerance is None or (leg_sigma is None and not rotary)):
         raise GoughError(

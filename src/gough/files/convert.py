@@ -51,7 +51,7 @@ def solve_file(
     out: str | Path | None,
     platform: Platform,
     *,
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
     angles: Angles | None = None,
     leg_noise: float | None = None,
     head: int = 0,
@@ -96,7 +96,7 @@ def solve_file(
         for block in job.blocks:
             readings = block.numbers(LEGS)
             if report.rows == 0:
-                check_plausible(job.source.where, platform, readings, reading.log)
+                check_plausible(job.source, platform, readings)
                 solver.compile(len(block), certify=certify)
                 report.start()
             solution = solver(readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
@@ -114,7 +114,7 @@ def inverse_file(
     out: str | Path | None,
     platform: Platform,
     *,
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
     head: int = 0,
     progress: Progress | None = None,
 ) -> Report:
@@ -197,13 +197,8 @@ def _open_job(
         numbers = pick(source.where, source.columns)
         keep = checked(source.where, source.columns, tuple(dict.fromkeys(reading.keep)))
         sink = stack.enter_context(open_sink(out, describe(platform))) if out else None
-        blocks = source.blocks(
-            numbers,
-            keep,
-            rows=reading.block_rows,
-            keep_bad=reading.keep_bad_rows,
-            typed=out is not None and file_format(out) == ".parquet",
-        )
+        typed = out is not None and file_format(out) == ".parquet"
+        blocks = source.blocks(numbers, keep, typed=typed)
         yield _Job(source, blocks, numbers, keep, sink)
 
 

@@ -17,8 +17,7 @@ import pyarrow.csv as pacsv
 
 from gough.errors import GoughError, InputError
 from gough.files.layout import BLANKS, as_utf8, check_text, find_layout
-from gough.files.log_format import LogFormat
-from gough.files.rows import MISSING, Block, Conversions
+from gough.files.rows import MISSING, Block, Conversions, Reading
 
 HEAD = 1 << 16  # bytes read to find the header
 LONGEST_HEADER = 1 << 19  # bytes
@@ -35,13 +34,9 @@ class CsvSource:
     """
 
     def __init__(
-        self,
-        file: BinaryIO,
-        where: str,
-        total: int | None,
-        log: LogFormat = LogFormat(),  # noqa: B008
+        self, file: BinaryIO, where: str, total: int | None, reading: Reading = Reading()
     ) -> None:
-        self.where, self.done, self.metadata = where, 0, {}
+        self.where, self.reading, self.done, self.metadata = where, reading, 0, {}
         self.conversions: Conversions = {}
         self._given = file
         try:
@@ -62,7 +57,7 @@ class CsvSource:
                     "of text that end with LF or CRLF"
                 )
         whole = start if ended else start[: _last_line_end(start, len(start))]
-        self.layout = find_layout(where, whole, log)
+        self.layout = find_layout(where, whole, reading.log)
         self.columns, self.units = self.layout.names, self.layout.units
         self._rest = start[self.layout.size :]
         while not self._rest.strip():
@@ -75,24 +70,18 @@ class CsvSource:
         self.columns = names
 
     def blocks(
-        self,
-        numbers: Sequence[str],
-        keep: Sequence[str] = (),
-        *,
-        rows: int,
-        keep_bad: bool = False,
-        typed: bool = False,
+        self, numbers: Sequence[str], keep: Sequence[str] = (), *, typed: bool = False
     ) -> Iterator[Block]:
         types = {name: pa.string() for name in keep} | {name: pa.float64() for name in numbers}
         # pyarrow catches Ctrl-C itself while it reads CSV, and loses it in blocks this small
         pa.enable_signal_handlers(False)
-        for line, data in self._chunks(rows):
+        for line, data in self._chunks(self.reading.block_rows):
             if typed:
                 text = {name: pa.string() for name in keep if name not in numbers}
                 table = self._block(data, line, text, keep_bad=True).table
                 types |= {name: _number_type(table.column(name)) for name in text}
                 typed = False
-            block = self._block(data, line, types, keep_bad)
+            block = self._block(data, line, types, self.reading.keep_bad_rows)
             if len(block):
                 yield block
 

@@ -13,11 +13,12 @@ from gough.errors import InputError
 from gough.files.csv import CsvSource
 from gough.files.layout import find_layout
 from gough.files.log_format import LogFormat
+from gough.files.rows import Reading
 
 EXCEL = (".xlsx", ".xlsm")
 
 
-def open_sheet(file: BinaryIO, where: str, log: LogFormat) -> CsvSource:
+def open_sheet(file: BinaryIO, where: str, reading: Reading) -> CsvSource:
     """Open the first sheet that has columns of six legs or of a pose, else the first with cells.
 
     Lines of the text are rows of the sheet. The sheet is read as a whole; Excel's have at most
@@ -40,9 +41,10 @@ def open_sheet(file: BinaryIO, where: str, log: LogFormat) -> CsvSource:
     texts = {name: text for name, text in texts.items() if text.strip()}
     if not texts:
         raise InputError(f"{where}: has no sheet with cells; expected a header and a row per pose")
-    chosen = next((name for name, text in texts.items() if _has_legs(text, log)), next(iter(texts)))
+    named = (name for name, text in texts.items() if _has_legs(text, reading.log))
+    chosen = next(named, next(iter(texts)))
     name = f"{where}, sheet {chosen!r}" if len(texts) > 1 else where
-    return CsvSource(io.BytesIO(texts[chosen]), name, None, log)
+    return CsvSource(io.BytesIO(texts[chosen]), name, None, reading)
 
 
 def _has_legs(text: bytes, log: LogFormat) -> bool:

@@ -51,10 +51,10 @@ class GivenRow:
     def __str__(self) -> str:
         return self.where
 
-    def open(self, log: LogFormat) -> CsvSource:
-        """The row as a file; `log` names no columns here."""
+    def open(self, reading: Reading) -> CsvSource:
+        """The row as a file; `reading` names no columns here."""
         text = "\t".join(self.names) + "\n" + "\t".join(self.values) + "\n"
-        return CsvSource(io.BytesIO(text.encode()), self.where, None, log)
+        return CsvSource(io.BytesIO(text.encode()), self.where, None, reading)
 
 
 Given = str | Path | GivenRow  # what rows are read from
@@ -85,7 +85,7 @@ def file_format(path: Given, *, read: bool = False) -> str:
 def open_source(
     path: Given,
     platform: Platform | None = None,
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
 ) -> Source:
     """Open a file of rows to read, or standard input for "-".
 
@@ -158,10 +158,10 @@ def _name_legs(source: Source, platform: Platform, form: LogFormat) -> list[str]
 
 def _open(path: Given, reading: Reading) -> Source:
     if isinstance(path, GivenRow):
-        return path.open(reading.log)
+        return path.open(reading)
     ending = file_format(path, read=True)
     if str(path) == STANDARD:
-        return CsvSource(sys.stdin.buffer, "standard input", None, reading.log)
+        return CsvSource(sys.stdin.buffer, "standard input", None, reading)
     try:
         file = open(path, "rb")  # noqa: SIM115 - the source closes it
     except IsADirectoryError:
@@ -170,12 +170,12 @@ def _open(path: Given, reading: Reading) -> Source:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     try:
         if ending == ".parquet":
-            return ParquetSource(file, str(path))
+            return ParquetSource(file, str(path), reading)
         if Path(path).suffix.lower() in EXCEL:
             with file:
-                return open_sheet(file, str(path), reading.log)
+                return open_sheet(file, str(path), reading)
         size = os.fstat(file.fileno()).st_size
-        return CsvSource(file, str(path), size or None, reading.log)
+        return CsvSource(file, str(path), size or None, reading)
     except BaseException:
         file.close()
         raise
@@ -226,7 +226,7 @@ def _standard_output() -> Iterator[BinaryIO]:
 def read_legs(
     path: Given,
     platform: Platform,
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
 ) -> Array:
     """Read all leg readings (N, 6) of a file, NaN where a value is absent.
 
@@ -241,9 +241,8 @@ def read_legs(
     """
     with closing(open_source(path, platform, reading)) as source:
         columns = file_leg_columns(source.where, source.columns)
-        blocks = source.blocks(columns, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
-        legs = np.concatenate([block.numbers(LEGS) for block in blocks])
-        check_plausible(source.where, platform, legs, reading.log)
+        legs = np.concatenate([block.numbers(LEGS) for block in source.blocks(columns)])
+        check_plausible(source, platform, legs)
         return legs
 
 

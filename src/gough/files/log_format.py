@@ -6,7 +6,6 @@ itself states: names such as "L1", "Leg 1 (mm)" or "actuator 1", and units besid
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
 from collections.abc import Sequence
@@ -20,12 +19,8 @@ from gough.checks import Array, as_batch
 from gough.columns import LEGS
 from gough.errors import GoughError, InputError, suggestion
 from gough.platform import Platform
+from gough.units import ANGLES, LENGTHS
 
-LENGTHS = {
-    "m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "micron": 1e-6,
-    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, '"': 0.0254, "ft": 0.3048,
-}  # fmt: skip  # [m]
-ANGLES = dict.fromkeys(("deg", "degree", "degrees", "°"), math.pi / 180) | {"rad": 1.0}
 # words that name a leg or its sensor where a number follows
 WORDS = (
     "a", "act", "actuator", "arm", "axis", "cyl", "cylinder", "enc", "encoder", "jack", "joint",

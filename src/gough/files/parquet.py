@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from gough.columns import STATUS
 from gough.errors import InputError
-from gough.files.rows import Block
+from gough.files.rows import Block, Reading
 from gough.tables import check_number
 
 PAGE_BUFFER = 1 << 20  # bytes read ahead in each column
@@ -27,8 +27,8 @@ class ParquetSource:
         InputError: not a Parquet file, cut off, or without rows.
     """
 
-    def __init__(self, file: BinaryIO, where: str) -> None:
-        self.where, self.done = where, 0
+    def __init__(self, file: BinaryIO, where: str, reading: Reading) -> None:
+        self.where, self.reading, self.done = where, reading, 0
         self._input = file
         try:
             # without pre_buffer and with a small buffer a row group is read page by page, so
@@ -52,19 +52,13 @@ class ParquetSource:
             raise InputError(f"{where}: holds no rows; expected a row per pose")
 
     def blocks(
-        self,
-        numbers: Sequence[str],
-        keep: Sequence[str] = (),
-        *,
-        rows: int,
-        keep_bad: bool = False,
-        typed: bool = False,
+        self, numbers: Sequence[str], keep: Sequence[str] = (), *, typed: bool = False
     ) -> Iterator[Block]:
         for name in numbers:
             self._check_number(name)
         wanted = list(dict.fromkeys([*keep, *numbers]))
         stored = [self._stored[name] for name in wanted]
-        batches = self._file.iter_batches(batch_size=rows, columns=stored)
+        batches = self._file.iter_batches(batch_size=self.reading.block_rows, columns=stored)
         while (batch := self._next(batches)) is not None:
             first = self.done + 1
             self.done += len(batch)

@@ -6,27 +6,29 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import InputError
-from gough.files.log_format import LENGTHS, LogFormat
+from gough.files.log_format import LogFormat
+from gough.files.rows import Source
 from gough.platform import Platform
+from gough.units import LENGTHS
 
 UNITS = ("m", "cm", "mm", "um", "in", "ft")
 NEAR = 0.3  # relative difference within which readings agree with a guess at what they are
 
 
-def check_plausible(where: str, platform: Platform, legs: Array, form: LogFormat) -> None:
+def check_plausible(source: Source, platform: Platform, legs: Array) -> None:
     """Raise if the readings of most rows have a likely mistake of unit or zero.
 
     Nothing is checked once a unit, a scale or an offset was given.
 
     Args:
-        where: the file, for the message.
+        source: the file.
         platform: the machine.
         legs: (N, 6) readings of a first part of the file.
-        form: the form of the readings that was given.
 
     Raises:
         InputError: naming the likely cause and the option that corrects it.
     """
+    form = source.reading.log
     if form != LogFormat(form.columns, decimal=form.decimal, time=form.time):
         return
     rows = legs[np.all(np.isfinite(legs), axis=-1) & np.any(legs != 0, axis=-1)]
@@ -34,7 +36,7 @@ def check_plausible(where: str, platform: Platform, legs: Array, form: LogFormat
         return
     fault = _angle_fault(rows) if platform.legs == "rotary" else _length_fault(platform, rows)
     if fault:
-        raise InputError(f"{where}: {fault}")
+        raise InputError(f"{source.where}: {fault}")
 
 
 def _angle_fault(rows: Array) -> str:

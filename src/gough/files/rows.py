@@ -114,6 +114,7 @@ class Source(Protocol):
 
     Attributes:
         where: name of the file for messages.
+        reading: options for reading it.
         columns, units: names of its columns, and units that stand below them.
         conversions: factor and offset of the columns to convert.
         metadata: text that the file carries, such as the platform it belongs to.
@@ -122,6 +123,7 @@ class Source(Protocol):
     """
 
     where: str
+    reading: Reading
     columns: list[str]
     units: list[str]
     conversions: Conversions
@@ -130,21 +132,13 @@ class Source(Protocol):
     done: int
 
     def blocks(
-        self,
-        numbers: Sequence[str],
-        keep: Sequence[str] = (),
-        *,
-        rows: int,
-        keep_bad: bool = False,
-        typed: bool = False,
+        self, numbers: Sequence[str], keep: Sequence[str] = (), *, typed: bool = False
     ) -> Iterator[Block]:
-        """Read the rest of the file, about `rows` rows at a time.
+        """Read the rest of the file, about `reading.block_rows` rows at a time.
 
         Args:
             numbers: columns to read as numbers.
             keep: columns to copy unchanged: as text from CSV, in their type from Parquet.
-            rows: rows in a block.
-            keep_bad: mark rows that cannot be read instead of raising an error.
             typed: read kept columns of CSV as numbers if the first block holds nothing else.
 
         Raises:

@@ -77,7 +77,6 @@ class TrajectoryFile:
     columns: tuple[str, ...]
     time: str | None
     seed: str
-    reading: Reading
 
     @property
     def has_poses(self) -> bool:
@@ -92,7 +91,7 @@ class TrajectoryFile:
         """
         time, count = self.time, 0
         keep = () if time is None else (time,)
-        for block in read_columns(self.source, self.columns, self.reading, keep):
+        for block in read_columns(self.source, self.columns, keep):
             rows = np.full((len(block), 3 + len(self.columns)), np.nan)
             rows[:, 0] = np.arange(count + 1, count + 1 + len(block))
             if time is not None:
@@ -100,8 +99,7 @@ class TrajectoryFile:
             rows[:, 2] = unusable_status(block)
             rows[:, 3:] = block.numbers(self.columns)
             if count == 0 and not self.has_poses:
-                where, log = self.source.where, self.reading.log
-                check_plausible(where, self.platform, rows[:, 3:], log)
+                check_plausible(self.source, self.platform, rows[:, 3:])
             count += len(block)
             yield rows
             if progress:
@@ -147,7 +145,7 @@ def open_trajectory(
     *,
     time: str | None = None,
     seed: str = "auto",
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
 ) -> Iterator[TrajectoryFile]:
     """Open a file of poses or of leg readings.
 
@@ -166,7 +164,7 @@ def open_trajectory(
         columns = pose_or_leg_columns(source.where, source.columns)
         if time is not None:
             checked(source.where, source.columns, (time,))
-        yield TrajectoryFile(source, platform, columns, time, seed, reading)
+        yield TrajectoryFile(source, platform, columns, time, seed)
 
 
 def read_row(
@@ -175,7 +173,7 @@ def read_row(
     row: int = 1,
     *,
     seed: str = "auto",
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
 ) -> Trajectory:
     """Read the pose in one row of a file of poses, or solve one row of leg readings.
 
@@ -206,12 +204,11 @@ def read_row(
 
 
 def read_columns(
-    source: Source, names: tuple[str, ...], reading: Reading, keep: tuple[str, ...] = ()
+    source: Source, names: tuple[str, ...], keep: tuple[str, ...] = ()
 ) -> Iterator[Block]:
     """Read number columns of an open file, with its column of statuses if it has one."""
     keep += (STATUS,) if STATUS in source.columns and STATUS not in names else ()
-    numbers = tuple(dict.fromkeys(names))
-    return source.blocks(numbers, keep, rows=reading.block_rows, keep_bad=reading.keep_bad_rows)
+    return source.blocks(tuple(dict.fromkeys(names)), keep)
 
 
 def unusable_status(block: Block) -> NDArray[np.int64]:

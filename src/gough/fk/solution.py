@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.columns import Angles, pose_names, solution_names
-from gough.pose import Pose, pose_cells, pose_values
+from gough.columns import Angles, solution_names
+from gough.pose import Pose, pose_cells, pose_table
 from gough.status import USABLE, Status
 from gough.tables import Kind, Table, TableInfo, label_column, make_frame, number_column
-from gough.text import length_head, number, page, pose_heads, rows_of
+from gough.text import number, page, pose_heads, rows_of, with_unit
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -103,8 +103,8 @@ class Solution:
             return [*pose_cells(at.pose), Status(int(at.status)).label, *last, *radius]
 
         heads = [*pose_heads(self.pose.batch, self.unit), "status"]
-        heads += [length_head("residual", self.unit), "iterations"]
-        heads += [] if self.radius is None else [length_head("radius", self.unit)]
+        heads += [with_unit("residual", self.unit), "iterations"]
+        heads += [] if self.radius is None else [with_unit("radius", self.unit)]
         notes = []
         for status, times in self.counts().items():
             first = np.argwhere(np.asarray(self.status) == status)[0].tolist()
@@ -124,8 +124,7 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
         GoughError: angles of another name.
     """
     with_covariance, with_radius = solution.covariance is not None, solution.radius is not None
-    numbers = list(pose_values(solution.pose, angles).T)
-    numbers += [np.ravel(solution.residual), np.ravel(solution.iterations)]
+    numbers = [np.ravel(solution.residual), np.ravel(solution.iterations)]
     if solution.covariance is not None:
         variances = np.diagonal(solution.covariance, axis1=-2, axis2=-1)
         deviations = np.sqrt(variances).reshape(-1, 6)
@@ -134,6 +133,6 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
         numbers += list(deviations.T)
     if solution.radius is not None:
         numbers.append(np.ravel(solution.radius))
-    columns = [number_column(values) for values in numbers]
-    columns.insert(len(pose_names(angles)), label_column(np.ravel(solution.status), LABELS))
+    status = label_column(np.ravel(solution.status), LABELS)
+    columns = [*pose_table(solution.pose, angles).values(), status, *map(number_column, numbers)]
     return dict(zip(solution_names(angles, with_covariance, with_radius), columns, strict=True))

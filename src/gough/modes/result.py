@@ -19,7 +19,7 @@ from gough.platform import Platform
 from gough.pose import Pose, pose_cells, pose_table
 from gough.status import ModesStatus
 from gough.tables import Kind, Table, TableInfo, label_column, make_frame, number_column
-from gough.text import length_head, number, page, pose_heads, rows_of
+from gough.text import number, page, pose_heads, rows_of, with_unit
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -171,8 +171,8 @@ class AssemblyModes:
 
         several, unit = self.legs.ndim > 1, self.platform.unit
         first, *heads = pose_heads((len(self.row),), unit)
-        heads = [first, *(["set"] if several else []), *heads, length_head("residual", unit)]
-        heads += [length_head("radius", unit), "to singularity"]
+        heads = [first, *(["set"] if several else []), *heads, with_unit("residual", unit)]
+        heads += [with_unit("radius", unit), "to singularity"]
         codes, times = np.unique(self.status, return_counts=True)
         notes = [
             f"{n:,} {ModesStatus(s).label}: {ModesStatus(s).text}"

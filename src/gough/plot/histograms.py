@@ -113,7 +113,7 @@ def read_errors(
     truth: str | Path | None = None,
     *,
     all_rows: bool = False,
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
     tick: Callable[[Source], None] | None = None,
 ) -> dict[str, LogHistogram]:
     """Read a file of solved poses into histograms of its errors.
@@ -146,9 +146,9 @@ def read_errors(
         true = None
         if truth is not None:
             opened = stack.enter_context(closing(open_source(truth, platform, reading)))
-            true = _Feed(opened, reading)
+            true = _Feed(opened)
             found |= {"position": LogHistogram(), "rotation": LogHistogram()}
-        for block in read_columns(source, (*names, *residual), reading):
+        for block in read_columns(source, (*names, *residual)):
             answered = (unusable_status(block) < 0) | all_rows
             if residual:
                 values = block.numbers(residual)[:, 0]
@@ -257,10 +257,10 @@ def _cycle(count: int) -> list:
 class _Feed:
     """Poses of a file, in pieces of any length."""
 
-    def __init__(self, source: Source, reading: Reading) -> None:
+    def __init__(self, source: Source) -> None:
         self._where = source.where
         self._names = pose_columns(source.where, source.columns)
-        self._blocks = read_columns(source, self._names, reading)
+        self._blocks = read_columns(source, self._names)
         self._values: Array = np.empty((0, len(self._names)))
 
     def take(self, count: int, beside: str) -> Pose:

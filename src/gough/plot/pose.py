@@ -26,10 +26,10 @@ from gough.plot.style import (
     GREY,
     INK,
     VERMILION,
+    label_number,
     length_unit,
     muted,
     new_figure,
-    number,
     pose_text,
     reading_name,
     reading_unit,
@@ -245,7 +245,7 @@ def _draw_readings(axes: Axes, platform: Platform, bones: Skeleton) -> None:
         color = VERMILION if wrong else leg_color(bones.share[i])
         axes.plot(readings[i], rows[i], "X" if wrong else "o", color=color, markersize=7,
                   markeredgecolor=color if wrong else "white")  # fmt: skip
-        text = number(readings[i], 100 if platform.legs == "rotary" else _digits(platform))
+        text = label_number(readings[i], 100 if platform.legs == "rotary" else _digits(platform))
         axes.annotate(text, (readings[i], rows[i]), xytext=(0, 8), textcoords="offset points",
                       ha="center", fontsize=7.5, color=VERMILION if wrong else INK)  # fmt: skip
     margin = 0.14 * (np.ptp(ends) or 0.01 * platform.size)

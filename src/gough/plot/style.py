@@ -20,13 +20,15 @@ from matplotlib.figure import Figure
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.platform import Platform
-from gough.pose import Pose
+from gough.pose import Pose, pose_values
+from gough.text import decimals
 from gough.whole_file import check_target, replacing
 
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9",
 )  # fmt: skip
 INK, GREY, FAINT = "#222222", "#707070", "#C8C8C8"
+MINUS = "\N{MINUS SIGN}"
 
 # six curves on one picture: colour and line style
 CURVES: tuple[tuple[str, Any], ...] = (
@@ -163,16 +165,16 @@ def shown_readings(platform: Platform, readings: Array) -> Array:
     return np.degrees(readings) if platform.legs == "rotary" else readings
 
 
-def number(value: float, size: float) -> str:
-    """Text of a length, to four digits of `size`, without a sign on zero."""
-    places = max(0, 3 - int(np.floor(np.log10(size))))
-    return f"{value:z.{places}f}".replace("-", "\N{MINUS SIGN}")
+def label_number(value: float, size: float) -> str:
+    """Text of a number, to four digits of `size`, without a sign on zero."""
+    return f"{value:z.{decimals(size, 4)}f}".replace("-", MINUS)
 
 
 def pose_text(platform: Platform, pose: Pose) -> str:
     """Position and Euler angles of one pose in two lines."""
-    lengths = ", ".join(number(v, platform.size / 10) for v in pose.position)
-    angles = ", ".join(number(v, 10) for v in np.degrees(pose.euler))
+    sizes = 3 * [platform.size / 10] + 3 * [10.0]
+    numbers = list(map(label_number, pose_values(pose, "deg"), sizes))
+    lengths, angles = ", ".join(numbers[:3]), ", ".join(numbers[3:])
     return f"({lengths}) {platform.unit}".rstrip() + f"\n({angles}) deg"
 
 

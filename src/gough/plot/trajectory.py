@@ -19,18 +19,19 @@ from gough.platform import Platform
 from gough.plot.style import (
     CURVES,
     INK,
+    MINUS,
     VERMILION,
+    label_number,
     length_unit,
     new_figure,
-    number,
     reading_name,
     reading_unit,
     shown_readings,
     styled,
 )
+from gough.pose import Pose, pose_values
 
 SIGNALS = (*(f"leg {i}" for i in range(1, 7)), "x", "y", "z", "rx", "ry", "rz")
-MINUS = "\N{MINUS SIGN}"
 JUMP = 180.0  # [deg] a larger change from row to row is an angle that passes +-180 deg
 FAR = 8.0  # distance of limits / range of the curves, beyond which limits would flatten them
 BINS = 600  # least number; a page is hardly finer
@@ -138,7 +139,7 @@ def read_trajectory(
     *,
     time: str | None = None,
     seed: str = "auto",
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
     tick: Callable[[Source], None] | None = None,
 ) -> Envelope:
     """Read a file of poses or of leg readings into an envelope for `trajectory_figure`.
@@ -160,21 +161,15 @@ def read_trajectory(
     with open_trajectory(path, platform, time=time, seed=seed, reading=reading) as file:
         for rows in file.blocks(tick):
             found = file.solve(rows)
-            values = signals(platform, found.legs, found.pose.position, found.pose.euler)
+            values = signals(platform, found.legs, found.pose)
             values[~found.usable, 0 if file.has_poses else 6 :] = np.nan
             envelope.add(_times(file, found), values, found.usable)
     return envelope
 
 
-def signals(platform: Platform, readings: Array, position: Array, euler: Array) -> Array:
-    """Values (n, 12) that `trajectory_figure` draws: readings as shown, position, angles [deg].
-
-    Args:
-        readings: (n, 6), as `gough.leg_lengths` gives them.
-        position: (n, 3) [platform unit].
-        euler: (n, 3) [rad].
-    """
-    return np.concatenate([shown_readings(platform, readings), position, np.degrees(euler)], axis=1)
+def signals(platform: Platform, readings: Array, pose: Pose) -> Array:
+    """Values (n, 12) of `SIGNALS`: readings as shown, position [platform unit], angles [deg]."""
+    return np.concatenate([shown_readings(platform, readings), pose_values(pose, "deg")], axis=1)
 
 
 @styled
@@ -272,7 +267,7 @@ def _position(axes: Axes, platform: Platform, envelope: Envelope) -> None:
     names = []
     for name, value in zip("xyz", home, strict=True):
         sign = MINUS if value > 0 else "+"
-        text = number(abs(value), platform.size)
+        text = label_number(abs(value), platform.size)
         names.append(name if not value else f"{name} {sign} {text.rstrip('0').rstrip('.')}")
     _curves(axes, envelope, range(6, 9), names, offsets=home)
     axes.set_ylabel(f"position from home\n[{length_unit(platform)}]")

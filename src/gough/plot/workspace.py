@@ -24,13 +24,13 @@ from gough.plot.style import (
     INK,
     PURPLE,
     VERMILION,
+    label_number,
     length_unit,
     muted,
     new_figure,
-    number,
     styled,
 )
-from gough.pose import Pose
+from gough.pose import Pose, pose_values
 
 NEAR_ZERO = 0.25  # colours begin at 0 where the least distance / largest is below this
 RIM = "#22222266"  # around lines on colours
@@ -249,7 +249,7 @@ def _fixed_text(cut: WorkspaceSlice) -> str:
         (angles, 100.0, "deg"),
     ):
         if names:
-            values = ", ".join(f"{n} {number(cut.fixed[n], size)}" for n in names)
+            values = ", ".join(f"{n} {label_number(cut.fixed[n], size)}" for n in names)
             parts.append(f"{values} {unit}")
     return "; ".join(parts)
 
@@ -262,8 +262,7 @@ def _is_angle(name: str) -> bool:
 
 
 def _home(platform: Platform) -> dict[str, float]:
-    values = [*platform.home.position, *np.degrees(platform.home.euler)]
-    return dict(zip(COORDINATES, map(float, values), strict=True))
+    return dict(zip(COORDINATES, pose_values(platform.home, "deg").tolist(), strict=True))
 
 
 def _fixed(platform: Platform, axes: tuple[str, str], at: Mapping[str, float]) -> dict[str, float]:

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from gough.checks import Array
 from gough.kernel.constants import SINGULAR
 from gough.platform import Platform
+from gough.pose import pose_values
 from gough.skeleton import outside_stroke
+from gough.text import decimals, with_unit
 from gough.view import meshes, scene
-from gough.view.model import CLOSE, Model, leg_factor, leg_unit, pose_numbers
+from gough.view.model import CLOSE, Model, leg_factor, leg_unit
 
 if TYPE_CHECKING:
     from gough.view.trajectory import Trajectory
@@ -84,6 +86,7 @@ def status_card(model: Model, note: str = "") -> str:
         took.append(f"{answer.iterations} iterations")
     if answer.seconds:
         took.append(_duration(answer.seconds))
+    numbers = pose_values(model.pose, "deg")
     aside = f"<div data-gough='note' style='{SMALL}'>{escape(note)}</div>" if note else ""
     return (
         f"{WIDE_BOXES}<div style='margin:0.4em 0.75em;padding:0.1em 0 0.1em 0.7em;"
@@ -91,7 +94,7 @@ def status_card(model: Model, note: str = "") -> str:
         f"<div data-gough='status' data-reached='{str(answer.reached).lower()}'>"
         f"{escape(answer.text)}</div><div style='{SMALL};display:flex;gap:0.6em'>"
         f"<span data-gough='took' style='flex:1'>{escape(' · '.join(took))}</span>"
-        f"{_copy('copy pose', pose_numbers(model.pose), 'x y z, rx ry rz [deg]')}"
+        f"{_copy('copy pose', numbers, 'x y z, rx ry rz [deg]')}"
         f"{_copy('copy readings', model.legs, 'as gough modes takes them')}"
         f"</div>{aside}</div>{_meter(model)}"
     )
@@ -120,7 +123,7 @@ def numbers_table(model: Model) -> str:
     what = "motor" if platform.legs == "rotary" else "leg"
     names = [f"{what} {i + 1}" for i in range(6)]
     units = [leg_unit(platform)] * 6, [platform.unit] * 3 + ["deg"] * 3
-    values = _number_cells(platform, model.legs, pose_numbers(model.pose))
+    values = _number_cells(platform, model.legs, pose_values(model.pose, "deg"))
     rows = ""
     for i in range(6):
         heads = with_unit(names[i], units[0][i]), with_unit(POSE_NAMES[i], units[1][i])
@@ -171,15 +174,10 @@ def row_text(trajectory: Trajectory, row: int) -> str:
 
 def mode_label(number: int, numbers: Array, platform: Platform) -> str:
     """One assembly mode in a line: its number, position and Euler angles (6,)."""
-    places = max(0, 3 - int(np.floor(np.log10(platform.size))))
+    places = decimals(platform.size, 4)
     position = ", ".join(f"{v:z.{places}f}" for v in numbers[:3])
     angles = ", ".join(f"{v:z.0f}" for v in numbers[3:])
     return f"{number}:  {position} {platform.unit};  {angles}°"
-
-
-def with_unit(name: str, unit: str) -> str:
-    """A name and its unit in brackets, if it has one."""
-    return f"{name} [{unit}]" if unit else name
 
 
 def _copy(label: str, values: Array, hint: str) -> str:
@@ -221,7 +219,7 @@ def _duration(seconds: float) -> str:
 
 def _number_cells(platform: Platform, legs: Array, numbers: Array) -> list[str]:
     """Reading 1, x, reading 2, y, ... as text: lengths to a millionth of the size's first digit."""
-    length = max(0, 6 - int(np.floor(np.log10(platform.size))))
+    length = decimals(platform.size, 7)
     reading = ANGLE_DIGITS if platform.legs == "rotary" else length
     cells = []
     for i in range(6):
@@ -291,7 +289,7 @@ def _caption(model: Model) -> str:
 
 def _caption_of_file(model: Model, trajectory: Trajectory, waits: Array) -> str:
     """Caption whose numbers and cursor follow the player."""
-    numbers = pose_numbers(trajectory.pose)
+    numbers = pose_values(trajectory.pose, "deg")
     rows = {
         "at": np.round(np.append(0.0, np.cumsum(waits)[:-1]), 4).tolist(),
         "share": np.round(100 * _shares(trajectory.time), 2).tolist(),

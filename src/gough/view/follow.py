@@ -9,7 +9,8 @@ long, a singularity is in the way.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +20,13 @@ from gough.platform import Platform
 from gough.pose import Pose
 from gough.status import Outcome, Status
 
+if TYPE_CHECKING:
+    from gough.fk.solve import Solver
+
 LONGEST_STEP = 0.1  # translation of the plate in one step / size
 WIDEST_STEP = 0.25  # [rad] rotation of the plate in one step
 SHORTEST_STEP = 1 / 256  # of the path; below it the search ends
+RESTARTS = 24  # further starts to look for a pose beyond a singularity
 BLOCKED = (
     "These readings have a pose, but a singularity lies between it and the present one: take "
     "another path, or pick the pose in the tab Modes."
@@ -53,22 +58,31 @@ class Arrival:
     seconds: float
 
 
-def follow(platform: Platform, pose: Pose, legs: Array, target: Array) -> Arrival:
-    """Find the pose at readings `target` (6,), in the assembly mode of a pose with `legs`."""
-    from gough.fk.solve import solve
+def step_solver(platform: Platform) -> Solver:
+    """Solver for one step: Newton's method from the present pose alone, on one thread."""
+    from gough.fk.solve import Solver  # Numba takes a second, which the first picture need not wait
 
+    return Solver(platform, "home", restarts=0, workers=1)
+
+
+def follow(solver: Solver, pose: Pose, legs: Array, target: Array) -> Arrival:
+    """Find the pose at readings `target` (6,), in the assembly mode of a pose with `legs`.
+
+    Args:
+        solver: the `step_solver` of the machine.
+    """
     begin = time.perf_counter()
     done, step, iterations, residual = 0.0, 1.0, 0, 0.0
     while done < 1.0:
         goal = min(1.0, done + step)
-        found = solve(platform, legs + goal * (target - legs), seed=pose, restarts=0, workers=1)
+        found = replace(solver, seed=pose)(legs + goal * (target - legs))
         iterations += int(found.iterations)
-        if _is_next(platform, pose, found.pose, found.status):
+        if _is_next(solver.platform, pose, found.pose, found.status):
             pose, done, step, residual = found.pose, goal, 2 * step, float(found.residual)
             continue
         step /= 2
         if step < SHORTEST_STEP or found.status == Status.INVALID_INPUT:
-            return _blocked(platform, pose, target, iterations, begin)
+            return _blocked(solver, pose, target, iterations, begin)
     return Arrival(pose, "", residual, iterations, time.perf_counter() - begin)
 
 
@@ -89,13 +103,9 @@ def _is_next(platform: Platform, old: Pose, new: Pose, status: Status) -> bool:
     return bool(np.isnan(signs).any() or signs[0] == signs[1])
 
 
-def _blocked(
-    platform: Platform, pose: Pose, target: Array, iterations: int, begin: float
-) -> Arrival:
-    """Tell readings that no pose has from readings with a pose beyond a singularity."""
-    from gough.fk.solve import solve
-
-    found = solve(platform, target, seed=pose, workers=1)
+def _blocked(solver: Solver, pose: Pose, target: Array, iterations: int, begin: float) -> Arrival:
+    """Distinguish readings that no pose has from readings with a pose beyond a singularity."""
+    found = replace(solver, seed=pose, restarts=RESTARTS)(target)
     beyond = has_pose(found.status)
     text = BLOCKED if beyond else REFUSED[found.status.label]
     residual = 0.0 if beyond else float(found.residual)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import time
 from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +20,12 @@ from gough.errors import GoughError
 from gough.kinematics import leg_lengths, singularity_distance, strut_vectors
 from gough.limit_rules import in_workspace
 from gough.platform import Platform
-from gough.pose import Pose
+from gough.pose import Pose, pose_values
 from gough.skeleton import outside_stroke
-from gough.view.follow import follow
+from gough.view.follow import follow, step_solver
+
+if TYPE_CHECKING:
+    from gough.fk.solve import Solver
 
 UNCHANGED = "The picture is unchanged; Undo resets the sliders."
 SHORTEST_STRUT = 1e-9  # / size; below it a strut has no direction
@@ -85,13 +90,13 @@ class Model:
         """Set some readings, by leg (0 to 5); the pose follows in its assembly mode."""
         target = self.asked.copy()
         target[list(readings)] = list(readings.values())
-        found = follow(self.platform, self.pose, self.legs, target)
+        found = follow(self.solver, self.pose, self.legs, target)
         known = (found.residual, found.iterations, found.seconds)
         if found.pose is not None:
             self._show(found.pose, target, "forward kinematics", *known)
             return
         self.answer = Answer(False, f"{found.text} {UNCHANGED}", "forward kinematics", *known)
-        self.asked, self.numbers = target, pose_numbers(self.pose)
+        self.asked, self.numbers = target, pose_values(self.pose, "deg")
 
     def ask_numbers(self, values: dict[int, float]) -> None:
         """Set some of x, y, z [platform unit] and rx, ry, rz [deg] (0 to 5); legs follow."""
@@ -112,7 +117,7 @@ class Model:
             self._show(pose, legs, "inverse kinematics", seconds=seconds)
             return
         self.answer = Answer(False, f"{problem} {UNCHANGED}", "inverse kinematics", seconds=seconds)
-        self.numbers, self.asked = pose_numbers(pose), self.legs.copy()
+        self.numbers, self.asked = pose_values(pose, "deg"), self.legs.copy()
 
     def pick(self, pose: Pose, residual: float) -> None:
         """Take another assembly mode with the present readings."""
@@ -148,6 +153,11 @@ class Model:
 
     # ---- state ------------------------------------------------------------------------
 
+    @cached_property
+    def solver(self) -> Solver:
+        """Solver of the machine, made once; see `step_solver`."""
+        return step_solver(self.platform)
+
     @property
     def singularity(self) -> float:
         """Distance to a singularity, 0 to about 1, see `gough.singularity_distance`; may be NaN."""
@@ -177,12 +187,7 @@ class Model:
 
     def _take(self, pose: Pose, legs: Array) -> None:
         self.pose, self.legs = pose, legs
-        self.numbers, self.asked = pose_numbers(pose), legs.copy()
-
-
-def pose_numbers(pose: Pose) -> Array:
-    """x, y, z [platform unit] and Euler angles [deg] of poses, (..., 6)."""
-    return np.concatenate([pose.position, np.degrees(pose.euler)], axis=-1)
+        self.numbers, self.asked = pose_values(pose, "deg"), legs.copy()
 
 
 def leg_factor(platform: Platform) -> float:

@@ -13,6 +13,8 @@ import numpy as np
 import viser
 
 from gough.platform import Platform
+from gough.pose import pose_values
+from gough.text import decimals, with_unit
 from gough.view import meshes
 from gough.view.export import (
     POSE_NAMES,
@@ -22,9 +24,8 @@ from gough.view.export import (
     row_text,
     status_card,
     strip,
-    with_unit,
 )
-from gough.view.model import Model, leg_factor, leg_unit, pose_numbers
+from gough.view.model import Model, leg_factor, leg_unit
 from gough.view.scene import VIEWS
 from gough.view.trajectory import Trajectory
 
@@ -134,7 +135,7 @@ class Range:
     @property
     def decimals(self) -> int:
         """Digits after the point, for 5000 to 50,000 steps."""
-        return max(0, -int(np.floor(np.log10((self.high - self.low) / STEPS))))
+        return decimals((self.high - self.low) / STEPS, 1)
 
     def reach(self, value: float) -> bool:
         """Grow to hold `value`; True if that was needed."""
@@ -201,7 +202,7 @@ def leg_ranges(platform: Platform) -> list[Range]:
 
 def pose_ranges(platform: Platform) -> list[Range]:
     """Ranges of x, y, z [platform unit] and rx, ry, rz [deg]: the workspace and more."""
-    home = pose_numbers(platform.home)
+    home = pose_values(platform.home, "deg")
     reach = np.repeat([TRANSLATION * platform.size, ROTATION], 3)
     box, limits = np.stack([-reach, reach], axis=1), None
     if platform.workspace is not None:
@@ -242,7 +243,7 @@ class ModesPanel:
 
         self.clear("")
         choice = choose_mode(modes)
-        numbers = pose_numbers(modes.pose)
+        numbers = pose_values(modes.pose, "deg")
         self._list.visible = len(modes.row) > 0
         with self._list:
             for number, i in enumerate(map(int, np.argsort(choice.rank)), 1):

@@ -108,7 +108,7 @@ def read(
     *,
     rows: int,
     time: str | None = None,
-    reading: Reading = Reading(),  # noqa: B008 - frozen
+    reading: Reading = Reading(),
 ) -> Trajectory:
     """Read a file of poses or of leg readings; of one that holds both, the poses.
 

@@ -169,7 +169,7 @@ class Viewer:
         home, legs = self.platform.home, self.platform.home_legs
         nowhere = np.full(6, 1e3 * self.platform.size)  # no pose has these: all restarts
         for target in (legs, nowhere):
-            follow(self.platform, home, legs, target)
+            follow(self.model.solver, home, legs, target)
         self._requests.post("ready", {})
 
     def _play(self) -> None:
