@@ -21,7 +21,8 @@ def page(
     No colours: the notebook's own theme, light or dark, gives them.
     """
     head = "".join(f"<th style='text-align:right'>{escape(text)}</th>" for text in heads)
-    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
+    cell = "<td style='text-align:right;white-space:nowrap'>{}</td>".format
+    body = "".join(f"<tr>{''.join(cell(escape(text)) for text in row)}</tr>" for row in rows)
     below = "".join(f"<div>{escape(text)}</div>" for text in notes)
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
     return f"<div><strong>{escape(title)}</strong>{table}{below}</div>"
@@ -64,7 +65,3 @@ def number(value: ArrayLike, digits: str = ".4g") -> str:
 def vector(values: ArrayLike, between: str = ", ") -> str:
     """Format numbers side by side."""
     return between.join(number(v, ".6g") for v in np.ravel(values))
-
-
-def _cell(text: str) -> str:
-    return f"<td style='text-align:right;white-space:nowrap'>{escape(text)}</td>"

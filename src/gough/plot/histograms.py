@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -197,7 +198,7 @@ def draw_histogram(axes: Axes, series: Mapping[str, LogHistogram], label: str) -
     edges = np.logspace(first, last, (last - first) * PER_DECADE + 1)
     zero = 10.0 ** (first - 0.6)
     lowest = 1.0
-    for (name, histogram), (color, line) in zip(series.items(), _cycle(len(series)), strict=True):
+    for (name, histogram), (color, line) in zip(series.items(), cycle(CURVES), strict=False):
         shares = histogram.shares(first, last)
         none = histogram.zeros / max(histogram.count, 1)
         seen = [s for s in (*shares, none) if s > 0]
@@ -248,10 +249,6 @@ def _legend(name: str, histogram: LogHistogram) -> str:
         f"largest {histogram.largest:.2g}"
     )
     return text + (f"; {histogram.left_out:,} left out" if histogram.left_out else "")
-
-
-def _cycle(count: int) -> list:
-    return [CURVES[i % len(CURVES)] for i in range(count)]
 
 
 class _Feed:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.errors import InputError
@@ -57,12 +58,10 @@ class Envelope:
     def __init__(self, names: tuple[str, ...], bins: int = BINS) -> None:
         self.names, self.width, self.rows, self.unanswered = names, 1, 0, 0
         self._most = 2 * bins
-        columns = 2 + 2 * len(names)  # first and last x, then lows, then highs
-        self._bins = np.empty((0, columns))
-        self._missing = np.empty(0, dtype=np.int64)
-        self._waiting = self._bins, self._missing
+        # columns: first and last x, rows without a pose, then lows, then highs
+        self._bins = self._waiting = np.empty((0, 3 + 2 * len(names)))
 
-    def add(self, x: Array, values: Array, answered: np.ndarray) -> None:
+    def add(self, x: Array, values: Array, answered: NDArray[np.bool_]) -> None:
         """Add rows.
 
         Args:
@@ -70,67 +69,54 @@ class Envelope:
             values: (n, K), NaN where there is none.
             answered: (n,) True for rows with a usable pose.
         """
-        gone = ~answered
-        rows = np.concatenate([x[:, None], x[:, None], values, values], axis=1)
         self.rows += len(x)
-        self.unanswered += int(gone.sum())
-        rows = np.concatenate([self._waiting[0], rows])
-        missing = np.concatenate([self._waiting[1], gone.astype(np.int64)])
+        self.unanswered += int(np.sum(~answered))
+        rows = np.concatenate([self._waiting, np.column_stack([x, x, ~answered, values, values])])
         while len(rows) >= self.width:
             room = (self._most - len(self._bins)) * self.width
             whole = min(room, len(rows) // self.width * self.width)
-            self._append(*self._merge(rows[:whole], missing[:whole], self.width))
-            rows, missing = rows[whole:], missing[whole:]
+            self._bins = np.concatenate([self._bins, self._merge(rows[:whole], self.width)])
+            rows = rows[whole:]
             if len(self._bins) == self._most:
-                self._bins, self._missing = self._merge(self._bins, self._missing, 2)
+                self._bins = self._merge(self._bins, 2)
                 self.width *= 2
-        self._waiting = rows, missing
+        self._waiting = rows
 
-    def _append(self, bins: Array, missing: np.ndarray) -> None:
-        self._bins = np.concatenate([self._bins, bins])
-        self._missing = np.concatenate([self._missing, missing])
-
-    def _merge(self, rows: Array, missing: np.ndarray, width: int) -> tuple[Array, np.ndarray]:
-        k = len(self.names)
+    def _merge(self, rows: Array, width: int) -> Array:
+        """One bin for each run of `width` bins."""
         groups = rows.reshape(-1, width, rows.shape[1])
-        merged = np.concatenate(
-            [
-                groups[:, 0, :1],
-                groups[:, -1, 1:2],
-                np.fmin.reduce(groups[:, :, 2 : 2 + k], axis=1),  # NaN only where all are
-                np.fmax.reduce(groups[:, :, 2 + k :], axis=1),
-            ],
-            axis=1,
-        )
-        return merged, missing.reshape(-1, width).sum(axis=1)
+        lows, highs = np.split(groups[:, :, 3:], 2, axis=2)
+        return np.column_stack([
+            groups[:, 0, 0], groups[:, -1, 1], groups[:, :, 2].sum(axis=1),
+            np.fmin.reduce(lows, axis=1), np.fmax.reduce(highs, axis=1),  # NaN only where all are
+        ])  # fmt: skip
 
-    def _table(self) -> tuple[Array, np.ndarray]:
+    def _table(self) -> Array:
         """All bins; the last one may hold fewer rows."""
-        rows, missing = self._waiting
-        if not len(rows):
-            return self._bins, self._missing
-        last, count = self._merge(rows, missing, len(rows))
-        return np.concatenate([self._bins, last]), np.concatenate([self._missing, count])
+        left = self._waiting
+        return (
+            np.concatenate([self._bins, self._merge(left, len(left))]) if len(left) else self._bins
+        )
 
     @property
     def x(self) -> Array:
         """Middle (B,) of each bin."""
-        return self._table()[0][:, :2].mean(axis=1)
+        return self._table()[:, :2].mean(axis=1)
 
     @property
     def low(self) -> Array:
         """Lowest values (B, K) of each bin."""
-        return self._table()[0][:, 2 : 2 + len(self.names)]
+        return self._table()[:, 3 : 3 + len(self.names)]
 
     @property
     def high(self) -> Array:
         """Highest values (B, K) of each bin."""
-        return self._table()[0][:, 2 + len(self.names) :]
+        return self._table()[:, 3 + len(self.names) :]
 
     @property
-    def missing(self) -> np.ndarray:
+    def missing(self) -> NDArray[np.int64]:
         """Number (B,) of rows without a usable pose in each bin."""
-        return self._table()[1]
+        return self._table()[:, 2].astype(np.int64)
 
 
 def read_trajectory(

@@ -152,7 +152,8 @@ def draw_slice(axes: Axes, cut: WorkspaceSlice) -> Any:
     )  # fmt: skip
     _equal_distance(axes, cut)
     _stroke(axes, cut)
-    _singularity(axes, cut)
+    _zero(axes, cut, cut.signed, colors="white", linewidths=4.0)  # a rim, for dark ground
+    _zero(axes, cut, cut.signed, colors=VERMILION, linewidths=2.2, linestyles="dashed")
     _box(axes, cut)
     axes.set(xlim=(cut.u[0], cut.u[-1]), ylim=(cut.v[0], cut.v[-1]))
     axes.set(xlabel=_label(cut, 0), ylabel=_label(cut, 1))
@@ -193,11 +194,6 @@ def _stroke(axes: Axes, cut: WorkspaceSlice) -> None:
         axes.contourf(cut.u, cut.v, np.ma.masked_invalid(worst), levels=[-np.inf, 0.0],
                       colors=["#FFFFFF70"], hatches=["///"])  # fmt: skip
     _zero(axes, cut, worst, colors=INK, linewidths=2.0)
-
-
-def _singularity(axes: Axes, cut: WorkspaceSlice) -> None:
-    _zero(axes, cut, cut.signed, colors="white", linewidths=4.0)  # a rim, for dark ground
-    _zero(axes, cut, cut.signed, colors=VERMILION, linewidths=2.2, linestyles="dashed")
 
 
 def _zero(axes: Axes, cut: WorkspaceSlice, values: Array, **look: Any) -> None:

@@ -103,7 +103,8 @@ class Scene:
             self._thick.batched_colors = paint
             if self._elbows is not None:
                 self._elbows.batched_positions = _single(parts.thin_start)
-            self._mark_outside_stroke(legs)
+            for i, out in enumerate(outside_stroke(self.platform, legs)):
+                self._labels[i].text = f"{i + 1} outside stroke" if out else f"{i + 1}"
 
     def pose_of_handle(self, position: Array, wxyz: Array) -> Pose:
         """Pose at which the plate is where the handle is."""
@@ -116,10 +117,6 @@ class Scene:
         pivot = self.platform.pivot_point
         rotated = pose.rotation @ (self._hub - pivot)
         return self.frame.drawn(rotated + pivot + pose.position)
-
-    def _mark_outside_stroke(self, legs: Array) -> None:
-        for i, out in enumerate(outside_stroke(self.platform, legs)):
-            self._labels[i].text = f"{i + 1} outside stroke" if out else f"{i + 1}"
 
     # ---- other modes and the path -----------------------------------------------------
 

@@ -184,7 +184,8 @@ class Viewer:
             begin, last = last, time.monotonic()
             now += self._speed * (last - begin)
             if self._playing:
-                self._requests.post("tick", {"row": row_of(times, now)})
+                row = int(np.searchsorted(times, now, side="right")) - 1
+                self._requests.post("tick", {"row": max(0, row)})
         self._requests.post("pause", {})
 
     def _find(self, legs: np.ndarray) -> None:
@@ -328,8 +329,3 @@ class Viewer:
                 self._requests.post("drop", {})
             elif event.phase == "update":
                 self._requests.post("drag", where)
-
-
-def row_of(values: np.ndarray, value: float) -> int:
-    """Index of the last of rising values (N,) that does not exceed `value`; 0 if all do."""
-    return max(0, int(np.searchsorted(values, value, side="right")) - 1)
