@@ -28,12 +28,19 @@ def run(command: str, last: int = 0) -> tuple[str, int]:
     """
     if command.strip() == "echo $?":
         return f"{last}\n", 0
+    if needs_bash(command):
+        return _bash(command)
+    _, *arguments = _words(command)
+    target = arguments[-1] if arguments[-2:-1] == [">"] else None
+    return _here(arguments[:-2] if target else arguments, target)
+
+
+def needs_bash(command: str) -> bool:
+    """True for all but `echo $?` and a single `gough`, whose output may go to a file."""
     words = _words(command)
-    target = words[-1] if words[-2:-1] == [">"] else None
-    plain = words[:-2] if target else words
-    if plain[:1] == ["gough"] and not {"-", "|", "&&", ";", "<", ">", ">>"} & set(plain):
-        return _here(plain[1:], target)
-    return _bash(command)
+    plain = words[:-2] if words[-2:-1] == [">"] else words
+    alone = plain[:1] == ["gough"] and not {"-", "|", "&&", ";", "<", ">", ">>"} & set(plain)
+    return not alone and command.strip() != "echo $?"
 
 
 def _words(command: str) -> list[str]:

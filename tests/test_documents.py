@@ -9,10 +9,25 @@ import documents
 import pytest
 import shell
 
-RUNNING = [p for p in documents.PAGES if documents.steps(p.read_text("utf-8"))]
+LEARNING = re.compile(r"torch|gough\.learn|gough (?:train|evaluate|dataset|inverse-network|paper)")
 
 
-@pytest.mark.parametrize("page", RUNNING, ids=lambda p: p.relative_to(documents.ROOT).as_posix())
+def running() -> list:
+    """Pages with something to run, marked by what that needs."""
+    params = []
+    for page in documents.PAGES:
+        steps = documents.steps(page.read_text("utf-8"))
+        needs = [pytest.mark.process] * any(
+            step.kind == "shell" and shell.needs_bash(step.code) for step in steps
+        )
+        needs += [pytest.mark.torch] * any(LEARNING.search(step.code) for step in steps)
+        if steps:
+            name = page.relative_to(documents.ROOT).as_posix()
+            params.append(pytest.param(page, marks=needs, id=name))
+    return params
+
+
+@pytest.mark.parametrize("page", running())
 def test_documents_run_and_print_what_they_say(page: Path) -> None:
     with documents.playground():
         wrong = documents.differences(page)
@@ -92,6 +107,7 @@ def test_the_harness_pairs_what_runs_with_its_output() -> None:
     assert [s.output is None for s in todo] == [False, True, True, False, False, False, True, True]
 
 
+@pytest.mark.process
 def test_the_harness_runs_python_and_commands() -> None:
     todo = documents.steps(PAGE)
     with documents.playground():
@@ -106,12 +122,14 @@ def test_the_harness_runs_python_and_commands() -> None:
         assert step.output is None or documents.same_output(text, step.output)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("block", ["```sh\nfalse\n```\n", "```console\n$ gough platforms x\n```\n"])
 def test_a_command_that_fails_is_told(block: str) -> None:
     with pytest.raises(AssertionError, match=r"page.md:2: exit code [12] of:"):
         list(documents.run(Path("page.md"), documents.steps(block)))
 
 
+@pytest.mark.process
 def test_pipes_go_to_bash_with_the_gough_under_test() -> None:
     assert shell.run("gough --version | tr a-z A-Z")[0].startswith("GOUGH ")
     assert shell.run("gough nonsense | cat")[1] == 2

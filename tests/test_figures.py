@@ -43,6 +43,7 @@ def curves(svg: str) -> np.ndarray:
     return np.array(re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", paths), dtype=float)
 
 
+@pytest.mark.process
 def test_each_figure_is_as_its_script_draws_it(drawn: Path) -> None:
     for path in sorted(drawn.glob("*.svg")):
         now, kept = path.read_text("utf-8"), (IMAGES / path.name).read_text("utf-8")
@@ -52,6 +53,7 @@ def test_each_figure_is_as_its_script_draws_it(drawn: Path) -> None:
         assert np.abs(curves(now) - curves(kept)).max() < SLACK, told
 
 
+@pytest.mark.process
 def test_each_figure_stands_on_a_page(drawn: Path) -> None:
     text = "".join(page.read_text("utf-8") for page in documents.PAGES)
     unused = [path.name for path in drawn.glob("*.svg") if f"images/{path.name})" not in text]

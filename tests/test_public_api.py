@@ -68,6 +68,7 @@ def test_star_import_gives_the_public_names() -> None:
 # ---- weight ---------------------------------------------------------------------------
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     "code",
     [
@@ -82,6 +83,7 @@ def test_light_work_loads_no_heavy_library(code: str) -> None:
     assert not set(HEAVY) & set(loaded)
 
 
+@pytest.mark.process
 def test_import_alone_loads_no_numpy() -> None:
     assert "numpy" not in fresh_python("import gough, sys; print(*sys.modules)").split()
 

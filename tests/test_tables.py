@@ -427,6 +427,7 @@ def test_the_columns_of_files_are_those_of_frames() -> None:
 # ---- weight ---------------------------------------------------------------------------
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("library", "other"), [("polars", "pandas"), ("pyarrow", "pandas")])
 def test_one_library_does_not_bring_another(library: str, other: str) -> None:
     make = {"polars": "polars.DataFrame", "pyarrow": "pyarrow.table"}[library]

@@ -134,6 +134,7 @@ def start_writing(path, then):
     )  # fmt: skip
 
 
+@pytest.mark.process
 def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text("old")
@@ -146,6 +147,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path):
     assert path.read_text() == "new"
 
 
+@pytest.mark.process
 def test_what_a_running_process_writes_stays(tmp_path):
     path = tmp_path / "poses.csv"
     with start_writing(path, "wait") as running:

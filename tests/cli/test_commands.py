@@ -119,6 +119,7 @@ def test_help_names_what_there_is_and_fits_80_columns(gough, arguments):
         assert all(name in out for name in COMMANDS)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("arguments", [[], ["solve", "--help"]])
 def test_help_loads_no_heavy_library(arguments):
     program = (
@@ -174,6 +175,7 @@ def test_paths_that_cannot_be_used_are_one_line_errors(gough, tmp_path, where):
         assert err.startswith(f"gough solve: error: {path}: ")
 
 
+@pytest.mark.process
 def test_names_with_spaces_and_standard_streams(tmp_path):
     path = tmp_path / "my legs.csv"
     path.write_text(EXAMPLE.read_text())

@@ -14,6 +14,8 @@ import pytest
 
 from .conftest import EXAMPLE, command, environment, process
 
+pytestmark = pytest.mark.process
+
 SLOW = ("--block-rows", 200)  # many blocks: time to interrupt
 
 

@@ -35,6 +35,7 @@ def need(*programs: str) -> None:
             pytest.skip(f"{program} is not installed")
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("compiler", CPLUSPLUS)
 @pytest.mark.parametrize(("name", "real"), KINDS.items())
 def test_no_compiler_warns(tmp_path: Path, name: str, real, compiler: str) -> None:
@@ -45,6 +46,7 @@ def test_no_compiler_warns(tmp_path: Path, name: str, real, compiler: str) -> No
         run([CPLUSPLUS[compiler], "-x", "c++", "-std=c++17", "-O2", *STRICT, source])
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("name", "real"), [("reachy_mini", "double"), ("rubin_camera", "float")])
 def test_what_is_written_builds_and_passes_its_own_test(tmp_path: Path, name: str, real) -> None:
     need("cmake", "ctest", "gcc")
@@ -67,6 +69,7 @@ def test_what_is_written_builds_and_passes_its_own_test(tmp_path: Path, name: st
     assert done.stderr == "skipped, expected six numbers: no reading\n"
 
 
+@pytest.mark.process
 def test_the_written_test_fails_for_another_machine(tmp_path: Path) -> None:
     need("gcc")
     write(Platform.load("reference"), tmp_path)
@@ -88,6 +91,7 @@ def test_fast_math_is_refused(tmp_path: Path) -> None:
         run(["gcc", "-ffast-math", "-c", tmp_path / "machine.c", "-o", "/dev/null"])
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("name", "real"), [("reference", "float"), ("reachy_mini", "double")])
 def test_hostile_readings_are_survived(tmp_path: Path, name: str, real) -> None:
     """NaN, infinity, denormal and huge, under the sanitizers: no pose called good is wrong."""
@@ -97,6 +101,7 @@ def test_hostile_readings_are_survived(tmp_path: Path, name: str, real) -> None:
     assert re.match(r"5000 readings, [1-9]\d+ poses called good, 0 of them wrong, 0 calls", said)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("real", ARM)
 @pytest.mark.parametrize("name", ["reference", "reachy_mini"])
 def test_code_and_stack_fit_a_cortex_m(tmp_path: Path, name: str, real) -> None:
@@ -146,6 +151,7 @@ def test_a_prefix_that_is_no_name_is_an_error(prefix: str, said: str) -> None:
         c_files(Platform.load("reference"), prefix)
 
 
+@pytest.mark.process
 def test_hostile_names_stay_in_their_comments(tmp_path: Path) -> None:
     need("gcc")
     name = 'a */ int x; "\n#error \\ ??/ @digest@'

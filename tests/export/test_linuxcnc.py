@@ -170,6 +170,7 @@ def test_units_are_converted_whole() -> None:
         assert np.all(other.in_workspace(pose))
 
 
+@pytest.mark.process
 def test_in_linuxcnc_itself(tmp_path: Path) -> None:
     """halcompile compiles it, halrun loads it: joints in, pose out, through HAL pins."""
     if not shutil.which("halcompile") or not shutil.which("halrun"):

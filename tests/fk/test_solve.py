@@ -113,6 +113,7 @@ def test_a_row_does_not_depend_on_its_neighbours(name):
 
 
 @pytest.mark.slow
+@pytest.mark.process
 def test_compiling_anew_changes_nothing_beyond_rounding(tmp_path):
     """A process that compiles and one that loads the compiled code agree.
 

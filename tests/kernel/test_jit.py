@@ -38,6 +38,7 @@ def _run(folder: Path) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.process
 @pytest.mark.slow
 def test_a_changed_source_never_runs_old_code(tmp_path):
     """The function that changes stands in another file than the one that is kept on disk."""

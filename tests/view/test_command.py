@@ -69,7 +69,7 @@ def test_rows_without_a_pose_are_counted(view, tmp_path):
         ([EXAMPLE, "-p", "rubin_camera", "--time", "when"], "no column 'when'"),
         (["-p", "reference", "--html", "no/such/folder.html"], "there is no folder"),
         (["-p", "reference", "--port", "70000"], "--port 70000: expected a number from 0 to"),
-        (["-p", "reference", "--host", "no.such.host.invalid"], "--host no.such.host.invalid: "),
+        (["-p", "reference", "--host", "no host"], "--host no host: "),
     ],
 )
 def test_a_mistake_is_one_line(view, tmp_path, monkeypatch, arguments, message):
@@ -112,6 +112,7 @@ def test_it_takes_the_next_port_that_is_free(monkeypatch):
             scene.close_server(server)
 
 
+@pytest.mark.process
 def test_ctrl_c_ends_it_quietly():
     command = [sys.executable, "-m", "gough.cli", "view", "-p", "reference", "--port", "0"]
     with subprocess.Popen(
