@@ -6,6 +6,7 @@ import dataclasses
 
 import machines
 import numpy as np
+from hypothesis import settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -23,6 +24,11 @@ TELESCOPIC_LIKE = tuple(n for n in Platform.catalog() if Platform.load(n).legs !
 seeds = st.integers(0, 2**32 - 1)
 batches = st.sampled_from(BATCHES)
 angles = st.sampled_from(ANGLES) | st.floats(0.0, np.pi)
+
+
+def at_most(count: int) -> settings:
+    """Settings with `count` samples, or as many as the profile has if those are fewer."""
+    return settings(max_examples=min(count, settings().max_examples))
 
 
 def unit_vectors(rng: np.random.Generator, *shape: int) -> Floats:

@@ -8,7 +8,7 @@ import machines
 import numpy as np
 import pytest
 import support
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support import Floats, reading_scale, unitless
 
@@ -16,7 +16,7 @@ import gough
 from gough import Platform, Pose, Status, jacobian, leg_lengths, quaternion, singularity_distance
 from gough.units import scaled
 
-few = settings(max_examples=15)
+few = support.at_most(15)
 
 
 # ---- kinematics -----------------------------------------------------------------------
@@ -115,7 +115,7 @@ def _assert_same_machine(a: Platform, pose_a: Pose, b: Platform, pose_b: Pose) -
 # ---- forward kinematics ---------------------------------------------------------------
 
 
-@settings(max_examples=25)
+@support.at_most(25)
 @given(support.seeds, st.sampled_from([1e-3, 1 / 25.4, 1e3]))
 def test_solve_gives_the_same_poses_in_another_unit(seed: int, scale: float) -> None:
     one = machines.regular_platform(seed)
@@ -130,7 +130,7 @@ def test_solve_gives_the_same_poses_in_another_unit(seed: int, scale: float) -> 
     )
 
 
-@settings(max_examples=25)
+@support.at_most(25)
 @given(support.seeds, st.permutations(range(6)))
 def test_solve_gives_the_same_poses_with_legs_renumbered(seed: int, order: list[int]) -> None:
     one = machines.regular_platform(seed)
@@ -143,7 +143,7 @@ def test_solve_gives_the_same_poses_with_legs_renumbered(seed: int, order: list[
     assert np.all(a.pose.distance(b.pose)[0][good] <= 1e-11 * sensitive)
 
 
-@settings(max_examples=25)
+@support.at_most(25)
 @given(support.seeds)
 def test_solve_moves_the_poses_with_the_base(seed: int) -> None:
     one = replace(machines.regular_platform(seed), workspace=None)

@@ -9,7 +9,7 @@ import mujoco_model
 import numpy as np
 import pytest
 import support
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
@@ -47,7 +47,7 @@ def test_readings_are_mujocos_tendons_through_offset_and_gain(seed: int) -> None
 
 
 @given(support.seeds, st.sampled_from(KINDS), st.sampled_from(["home", "polynomial-3"]))
-@settings(max_examples=15)
+@support.at_most(15)
 def test_inverse_then_forward_gives_the_pose_back(seed: int, kind: str, start: str) -> None:
     """In blocks (100 rows), alone (1 row) and from the tracker."""
     platform = machines.random_platform(seed, kind, sensors=True)

@@ -168,7 +168,7 @@ MISTAKES = {
     "the poses are inverse": lambda legs, pose: (legs, pose.inverse()),
     "the rotations are transposed": lambda legs, pose: (
         legs, Pose(pose.position, pose.inverse().wxyz)),
-    "one row behind": lambda legs, pose: (legs, pose[np.roll(np.arange(40), 1)]),
+    "one row behind": lambda legs, pose: (legs, pose[np.roll(np.arange(20), 1)]),
     "legs 1 and 2 are swapped": lambda legs, pose: (legs[:, [1, 0, 2, 3, 4, 5]], pose),
     "inch, but the machine is in mm": lambda legs, pose: (
         legs, Pose(pose.position / 25.4, pose.wxyz)),
@@ -182,7 +182,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("name", MISTAKES)
 def test_the_likely_mistake_is_named(name: str) -> None:
-    legs, poses = MISTAKES[name](LEGS, POSES)
+    legs, poses = MISTAKES[name](LEGS[:20], POSES[:20])
     with pytest.raises(GoughError) as caught:
         gough.calibrate(REFERENCE.drawing, legs, poses, **options(REFERENCE))
     assert "likely mistake" in str(caught.value)

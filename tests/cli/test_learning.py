@@ -8,6 +8,7 @@ import pytest
 import gough as library
 
 pytest.importorskip("torch")
+pytestmark = pytest.mark.torch
 
 
 def test_train_then_solve(gough, tmp_path, monkeypatch):

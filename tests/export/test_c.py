@@ -10,7 +10,7 @@ import pytest
 import support
 from exported import Machine
 from exported.drives import faulty, path, taken, tracked
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
@@ -21,7 +21,7 @@ from gough.quaternion import product
 
 KINDS = ("reference", "rubin_camera", "reachy_mini", "linuxcnc_genhex")
 REALS = {"double": 1e-12, "float": 2e-6}  # error of a pose, as a share of the size
-few = settings(max_examples=10)
+few = support.at_most(10)
 
 
 def shift(platform: Platform, a: Pose, b: Pose) -> np.ndarray:
@@ -43,7 +43,7 @@ def test_a_smooth_drive_is_followed_as_in_python(built, name: str, real) -> None
     assert rows.steps[1:].max() <= 5
 
 
-@settings(max_examples=6)
+@support.at_most(6)
 @given(st.sampled_from(KINDS), support.seeds)
 def test_faults_have_the_events_of_python(built, name: str, seed: int) -> None:
     """Compare events to the letter; where other starts are involved, within 30 cycles."""

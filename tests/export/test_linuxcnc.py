@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 import support
 from exported import run
-from hypothesis import given, settings
+from hypothesis import given
 
 import gough
 from gough import GoughError, Platform, Pose, Status
@@ -87,7 +87,7 @@ def joints_of(platform: Platform, pose: Pose) -> np.ndarray:
     return np.degrees(legs) if platform.rotary else legs
 
 
-@settings(max_examples=20)
+@support.at_most(20)
 @given(support.seeds)
 def test_both_ways_are_goughs_in_millimetres_and_rpy_degrees(stubs, seed: int) -> None:
     for name in KINDS:

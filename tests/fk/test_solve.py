@@ -8,7 +8,8 @@ from dataclasses import replace
 import machines
 import numpy as np
 import pytest
-from hypothesis import given, settings
+import support
+from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
@@ -196,7 +197,7 @@ def test_lengths_that_are_none(value):
     assert gough.solve(camera, np.full(6, -50.0)).status == Status.INVALID_INPUT
 
 
-@settings(max_examples=40)
+@support.at_most(40)
 @given(
     st.lists(
         st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=6, max_size=6),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import support
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
@@ -146,7 +146,7 @@ def test_the_first_reading_is_found_wherever_it_is(reference):
     assert known.event == Event.FOLLOWED
 
 
-@settings(max_examples=20)
+@support.at_most(20)
 @given(
     st.lists(
         st.one_of(

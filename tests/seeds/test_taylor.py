@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+import support
+from hypothesis import given
 from hypothesis import strategies as st
 from machines import permuted, random_platform
 from support import moved, random_platforms
@@ -14,7 +15,7 @@ from gough.seeds.base import find_seed
 from gough.seeds.taylor import TaylorSeed
 from gough.units import scaled
 
-few = settings(max_examples=20, deadline=None)
+few = support.at_most(20)
 ORDERS = (1, 2, 3, 4)
 
 

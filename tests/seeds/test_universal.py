@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+import support
+from hypothesis import given
 from hypothesis import strategies as st
 from machines import permuted, random_platform
 
@@ -17,7 +18,7 @@ from gough.seeds.taylor import HomeStruts
 from gough.seeds.universal import UniversalSeed
 from gough.units import scaled
 
-few = settings(max_examples=12, deadline=None)
+few = support.at_most(12)
 seeds = st.integers(0, 10**6)
 kinds = st.sampled_from(["telescopic", "length_change", "rotary"])
 

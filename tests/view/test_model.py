@@ -103,7 +103,7 @@ def test_the_unit_of_length_changes_nothing():
 def test_a_long_step_ends_where_many_short_ones_do():
     """Newton's method alone goes to another mode for some of these."""
     platform = Platform.load("reference").with_workspace(100, 60)
-    targets = gough.leg_lengths(platform, platform.sample_poses(60, seed=5))
+    targets = gough.leg_lengths(platform, platform.sample_poses(60, seed=5)[:40])
     solver = step_solver(platform)
     jumps = arrivals = 0
     for target in targets:
@@ -115,14 +115,14 @@ def test_a_long_step_ends_where_many_short_ones_do():
             continue
         arrivals += 1
         legs, pose = platform.home_legs, platform.home
-        for share in np.linspace(0, 1, 101)[1:]:
+        for share in np.linspace(0, 1, 41)[1:]:
             way = platform.home_legs + share * (target - platform.home_legs)
             step = follow(solver, pose, legs, way)
             assert step.pose is not None
             pose, legs = step.pose, way
         assert_near(found.pose, pose, platform.size, 1e-7)
         assert gough.assembly_sign(platform, pose) == 1
-    assert arrivals > 30
+    assert arrivals > 20
     assert jumps > 0, "no start here tells following from solving; draw others"
 
 
