@@ -47,9 +47,9 @@ def test_dietmaiers_forty_poses_are_all_poses():
     found = np.linalg.norm(gough.joint_positions(platform, pose) - platform.base, axis=-1)
     assert np.abs(found - legs).max() < 1e-11
     modes: list[gough.Pose] = []
-    for one in (pose[i] for i in range(len(pose))):
-        if all(sum(one.distance(mode)) > 1e-3 for mode in modes):
-            modes.append(one)
+    while len(pose):
+        modes.append(pose[0])
+        pose = pose[np.add(*pose.distance(modes[-1])) > 1e-3]
     assert 30 <= len(modes) <= 40
     # Dietmaier's platform: the closest two of the forty are 0.3375 apart in (R, t)
     at_home = [m for m in modes if sum(m.distance(platform.home)) < 1e-6]
