@@ -21,9 +21,9 @@ from support import Floats
 
 import gough
 from gough import Platform, Pose
-from gough.export.linuxcnc import MILLIMETRES, in_unit
 from gough.export.mjcf import to_mjcf
 from gough.limit_rules import legs_in_stroke
+from gough.units import LENGTHS, in_unit
 
 NEAR = 1e-6  # of the size
 
@@ -32,7 +32,7 @@ class Model:
     """An exported machine, held at its keyframe."""
 
     def __init__(self, platform: Platform, gravity: bool = False) -> None:
-        self.platform = in_unit(platform, "m") if platform.unit in MILLIMETRES else platform
+        self.platform = in_unit(platform, "m") if platform.unit in LENGTHS else platform
         self.model = mujoco.MjModel.from_xml_string(to_mjcf(platform, gravity))
         self.data = mujoco.MjData(self.model)
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)

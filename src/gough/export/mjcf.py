@@ -20,7 +20,6 @@ import numpy as np
 
 import gough
 from gough.checks import Array
-from gough.export.linuxcnc import MILLIMETRES, in_unit
 from gough.export.template import comment_text
 from gough.kinematics import (
     equivalent_struts,
@@ -30,6 +29,7 @@ from gough.kinematics import (
 )
 from gough.platform import Platform
 from gough.struts import arm_directions, rods_and_rates
+from gough.units import LENGTHS, in_unit
 
 TIMESTEP = 0.002  # [s]
 FASTEST = 0.3 / TIMESTEP  # [rad/s] of the servos' oscillations, which the steps must resolve
@@ -57,7 +57,7 @@ def to_mjcf(platform: Platform, gravity: bool = False) -> str:
         >>> to_mjcf(gough.Platform.load("reference")).splitlines()[0]
         '<mujoco model="reference">'
     """
-    machine = in_unit(platform, "m") if platform.unit in MILLIMETRES else platform
+    machine = in_unit(platform, "m") if platform.unit in LENGTHS else platform
     root = ET.Element("mujoco", model=comment_text(platform.name))
     root.append(ET.Comment(_facts(platform, machine)))
     _add_settings(root, machine, gravity)

@@ -69,9 +69,10 @@ class Envelope:
             values: (n, K), NaN where there is none.
             answered: (n,) True for rows with a usable pose.
         """
+        gone = (~answered).astype(np.float64)
         self.rows += len(x)
-        self.unanswered += int(np.sum(~answered))
-        rows = np.concatenate([self._waiting, np.column_stack([x, x, ~answered, values, values])])
+        self.unanswered += int(gone.sum())
+        rows = np.concatenate([self._waiting, np.column_stack([x, x, gone, values, values])])
         while len(rows) >= self.width:
             room = (self._most - len(self._bins)) * self.width
             whole = min(room, len(rows) // self.width * self.width)
