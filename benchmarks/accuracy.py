@@ -47,7 +47,7 @@ def wide_workspace() -> None:
         for seed in ("home", "polynomial-2", "polynomial", "polynomial-5", "polynomial-7"):
             solution = gough.solve(machine, legs, seed=seed, restarts=restarts)
             true = solution.pose.distance(pose)[0] < 1e-6 * machine.size
-            other = solution.status == Status.OUTSIDE_WORKSPACE
+            other = solution.status == Status.OTHER_MODE
             lost = np.isin(solution.status, [Status.UNREACHABLE, Status.NOT_CONVERGED])
             shares = (true, ~true & solution.usable, ~true & other, lost)
             cells = " | ".join(f"{np.mean(share):.3%}" for share in shares)

@@ -168,7 +168,8 @@ def home_table(folder: Path, count: int) -> None:
 
 
 def home_row(name: str, true, status, steps, seconds: float) -> None:
-    usable, failed = status <= Status.NEAR_SINGULARITY, status > Status.OUTSIDE_WORKSPACE
+    usable = status <= Status.OUTSIDE_WORKSPACE
+    failed = ~usable & (status != Status.OTHER_MODE)
     true = true & ~failed
     shares = [true, ~true & usable, ~true & ~usable & ~failed, failed]
     cells = " | ".join(f"{np.mean(share):.3%}" for share in shares)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
-from gough import Status, limit_rules
+from gough import Status, home_mode, limit_rules
 from gough.kernel import layout
 from gough.kernel.constants import kernel_constants
 from gough.kernel.jit import jit
@@ -55,7 +55,7 @@ def test_everybody_agrees_on_a_reading_at_its_limit(over, inside):
     assert found.status == (Status.CONVERGED if inside else Status.OUTSIDE_STROKE)
     many = gough.solve(platform, np.tile(legs, (2_000, 1)))
     assert np.all(many.status == found.status)
-    back = limit_rules.pose_status(platform, found.pose, legs)
+    back = home_mode.pose_status(platform, found.pose, legs)
     assert back == (InverseStatus.OK if inside else InverseStatus.OUTSIDE_STROKE)
     modes = gough.assembly_modes(platform, legs)
     nearest = int(np.argmin(modes.pose.distance(found.pose)[0]))
@@ -63,17 +63,17 @@ def test_everybody_agrees_on_a_reading_at_its_limit(over, inside):
 
 
 def test_solve_and_inverse_have_one_precedence():
-    """Outside both limits, both say that the pose is outside the workspace."""
+    """Outside both limits, both say that a reading is outside the stroke, which is worse."""
     platform = gough.Platform.load("reference")
     pose = gough.Pose(platform.home.position + np.array([0, 0, 60.0]))
     legs = gough.leg_lengths(platform, pose)
     platform = replace(platform, stroke=np.array([600.0, legs.min() - 1]))
-    assert gough.solve(platform, legs, seed=pose).status == Status.OUTSIDE_WORKSPACE
-    status = limit_rules.pose_status(platform, pose, legs)
-    assert status == InverseStatus.OUTSIDE_WORKSPACE
-    nothing = limit_rules.pose_status(platform, gough.Pose(np.full(3, np.nan)), legs)
+    assert gough.solve(platform, legs, seed=pose).status == Status.OUTSIDE_STROKE
+    status = home_mode.pose_status(platform, pose, legs)
+    assert status == InverseStatus.OUTSIDE_STROKE
+    nothing = home_mode.pose_status(platform, gough.Pose(np.full(3, np.nan)), legs)
     assert nothing == InverseStatus.INVALID_INPUT
-    assert limit_rules.pose_status(platform, pose, legs * np.nan) == InverseStatus.UNREACHABLE
+    assert home_mode.pose_status(platform, pose, legs * np.nan) == InverseStatus.UNREACHABLE
 
 
 def test_no_limits_no_verdict():

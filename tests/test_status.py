@@ -21,7 +21,8 @@ def test_every_status_is_a_sentence_a_user_can_act_on(status: Status) -> None:
 
 def test_only_poses_that_can_be_relied_on_are_usable() -> None:
     assert {s for s in Status if s.usable} == set(USABLE)
-    assert not Status.OUTSIDE_WORKSPACE.usable
+    assert Status.OUTSIDE_WORKSPACE.usable
+    assert not Status.OTHER_MODE.usable
     assert not Status.UNREACHABLE.usable
 
 

@@ -10,6 +10,8 @@ The struts d_i stand in `gough.struts`. A strut's length changes with the twist 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,6 +21,8 @@ from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose, as_pose
 from gough.tables import Table, as_readings
+
+SINGULAR = 1e-3  # distance to singularity below which a pose is called close to one
 
 
 def joint_positions(platform: Platform, pose: Pose) -> Array:
@@ -112,11 +116,22 @@ def singularity_distance(platform: Platform, pose: Pose) -> Array:
 def assembly_sign(platform: Platform, pose: Pose) -> Array:
     """Sign of det(Jacobian) times that at home, (...): -1 means a singularity lies between.
 
-    NaN where the pose is, or where a motor cannot reach it.
+    NaN where the pose is, or where a motor cannot reach it; 0 everywhere if home is singular.
     """
-    home = np.linalg.slogdet(normalised_jacobian(platform, platform.home))[0]
     rows, known = _finite_rows(normalised_jacobian(platform, pose))
-    return np.where(known, np.linalg.slogdet(rows)[0] * home, np.nan)[()]
+    return np.where(known, np.linalg.slogdet(rows)[0] * home_sign(platform), np.nan)[()]
+
+
+@lru_cache(maxsize=256)
+def home_sign(platform: Platform) -> float:
+    """Sign of det(Jacobian) at home, 0.0 where home is singular.
+
+    It counts as singular where its `singularity_distance` is below SINGULAR: then the determinant
+    is zero, or changes its sign so near that it cannot tell assembly modes apart.
+    """
+    rows, _ = _finite_rows(normalised_jacobian(platform, platform.home))
+    distance = np.linalg.svd(rows, compute_uv=False)[-1]
+    return float(np.linalg.slogdet(rows)[0]) if distance >= SINGULAR else 0.0
 
 
 def normalised_jacobian(platform: Platform, pose: Pose) -> Array:

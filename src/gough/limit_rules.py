@@ -1,4 +1,4 @@
-"""The limits of a machine: one rule for the stroke, one for the workspace, one precedence.
+"""The limits of a machine: one rule for the stroke, one for the workspace.
 
 Everything that compares readings with the stroke or poses with the workspace uses these
 functions; `kernel.pose_io.in_stroke` and `kernel.equations.assess` repeat them in compiled code.
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.pose import Pose
-from gough.status import InverseStatus
 
 if TYPE_CHECKING:
     from gough.platform import Platform
@@ -61,17 +60,3 @@ def in_workspace(platform: Platform, pose: Pose) -> NDArray[np.bool_]:
     if platform.workspace is None:
         return np.ones(pose.batch, dtype=bool)
     return platform.workspace.contains(platform.home, pose, SLACK * platform.size, SLACK)
-
-
-def pose_status(platform: Platform, pose: Pose, legs: Array) -> NDArray[np.uint8]:
-    """Return the `InverseStatus` (N,) of poses (N,) whose readings are legs (N, 6).
-
-    Where several apply, the one that leaves least stands, as `gough.solve` has it: no pose, no
-    readings, outside the workspace, outside the stroke.
-    """
-    status = np.full(pose.batch, InverseStatus.OK, np.uint8)
-    status[~in_stroke(platform, legs)] = InverseStatus.OUTSIDE_STROKE
-    status[~in_workspace(platform, pose)] = InverseStatus.OUTSIDE_WORKSPACE
-    status[~np.all(np.isfinite(legs), axis=-1)] = InverseStatus.UNREACHABLE
-    status[np.isnan(pose.position[..., 0])] = InverseStatus.INVALID_INPUT
-    return status

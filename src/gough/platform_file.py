@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import tomllib
 from difflib import get_close_matches
 from importlib import resources
@@ -14,12 +15,14 @@ from gough import quaternion
 from gough.checks import platform_field
 from gough.errors import GoughError, PlatformError, suggestion
 from gough.frames import Frames
+from gough.kinematics import home_sign, singularity_distance
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
 from gough.whole_file import write_whole
 from gough.workspace import Workspace
 
+log = logging.getLogger("gough")
 REQUIRED = ("base", "moving", "home")
 PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
 OPTIONAL = (*PLAIN, "workspace", "rotary", "frames", "readings")  # readings: see files.log_format
@@ -57,7 +60,7 @@ def load(name_or_path: str | Path) -> Platform:
     """Load a platform; see `Platform.load`."""
     text_name = str(name_or_path)
     if not text_name.endswith(".toml"):
-        return from_toml(catalog_text(text_name), where=text_name)
+        return _warned(text_name, from_toml(catalog_text(text_name), where=text_name))
     path = Path(name_or_path)
     try:
         text = path.read_text("utf-8")
@@ -67,7 +70,19 @@ def load(name_or_path: str | Path) -> Platform:
         raise PlatformError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:  # a NUL in the path
         raise PlatformError(f"{text_name!r}: cannot be read: {error}") from None
-    return from_toml(text, where=str(path))
+    return _warned(str(path), from_toml(text, where=str(path)))
+
+
+def _warned(where: str, platform: Platform) -> Platform:
+    """Return the platform, after a warning if its home is singular."""
+    if not home_sign(platform):
+        distance = singularity_distance(platform, platform.home)
+        log.warning(
+            "%s: the home pose is singular (distance %.1g): the legs do not hold the platform "
+            "there, and the sign of det J cannot tell assembly modes apart, so every row is "
+            "compared with all its modes, which is slow; choose another home", where, distance,
+        )  # fmt: skip
+    return platform
 
 
 def from_toml(text: str, where: str = "platform") -> Platform:

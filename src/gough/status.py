@@ -53,10 +53,9 @@ class Status(Outcome):
         "errors become large pose errors: treat its last digits with care, or move away."
     )
     OUTSIDE_WORKSPACE = 3, (
-        "A pose has these leg readings, but it is outside the stated workspace or beyond a "
-        "singularity, so it is probably another assembly mode: pass a seed near the true pose, "
-        "or widen the workspace."
-    ), False
+        "The pose has these leg readings and is in home's assembly mode, but is outside the "
+        "stated workspace: widen the workspace if the machine really goes there."
+    )
     UNREACHABLE = 4, (
         "No pose matches these leg readings; the closest one misses by the residual: check the "
         "readings' unit, order and zero, and the platform's joints."
@@ -71,9 +70,13 @@ class Status(Outcome):
         "this one."
     )
     AMBIGUOUS = 8, (
-        "Another pose has these leg readings too, inside the workspace and the stroke and on "
-        "home's side of the singularities: readings alone cannot tell which is the machine's; use "
-        "a seed near the true pose, or another sensor (see gough.choose_mode)."
+        "Another pose has these leg readings too, and could be the machine's as well: use a seed "
+        "near the true pose, or another sensor (see gough.choose_mode)."
+    ), False
+    OTHER_MODE = 9, (
+        "A pose has these leg readings, but a singularity lies between home and it, so it is "
+        "probably another assembly mode than the machine's: pass a seed near the true pose, or "
+        "follow the rows from a known pose."
     ), False
 
 
@@ -107,6 +110,10 @@ class InverseStatus(Outcome):
     OUTSIDE_WORKSPACE = 2, "The pose is outside the stated workspace."
     UNREACHABLE = 3, "A motor's arm and rod cannot reach the pose.", False
     INVALID_INPUT = 4, "The row is not a pose: correct it.", False
+    OTHER_MODE = 5, (
+        "A singularity lies between home and the pose, so it is probably in another assembly mode "
+        "than the machine."
+    ), False
 
 
 class ModesStatus(Outcome):

@@ -261,7 +261,7 @@ def test_another_mode_is_reported_and_kept_when_asked_for():
     mirror = gough.Pose(pose.position * [1, 1, -1], np.stack([w, -x, -y, z], axis=-1))
     np.testing.assert_allclose(gough.leg_lengths(platform, mirror), legs, rtol=1e-12)
     solution = gough.solve(platform, legs, seed=mirror)
-    assert np.all(solution.status == Status.OUTSIDE_WORKSPACE)
+    assert np.all(solution.status == Status.OTHER_MODE)
     assert solution.pose.distance(mirror)[0].max() < 1e-9
     assert np.all(gough.solve(platform, legs).status == Status.CONVERGED)
 
@@ -277,7 +277,7 @@ def test_near_a_singularity():
     worst = pose[int(np.argmin(distance))]
     assert gough.singularity_distance(platform, worst) < 1e-3
     solution = gough.solve(platform, gough.leg_lengths(platform, worst), seed=worst)
-    assert solution.status in (Status.NEAR_SINGULARITY, Status.OUTSIDE_WORKSPACE)
+    assert solution.status in (Status.NEAR_SINGULARITY, Status.OTHER_MODE)
     assert solution.residual <= 1e-12 * platform.size
     asked = gough.solve(platform, platform.home_legs, singular=0.999)
     assert asked.status == Status.NEAR_SINGULARITY

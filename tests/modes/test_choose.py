@@ -66,8 +66,10 @@ def test_ambiguity_is_reported():
     modes = gough.assembly_modes(platform, platform.home_legs)
     choice = gough.choose_mode(modes)
     assert choice.ambiguous
-    assert ambiguous(platform, platform.home_legs)
-    assert not ambiguous(known, known.home_legs)
+    assert ambiguous(gough.assembly_modes(platform, platform.home_legs))
+    modes = gough.assembly_modes(known, known.home_legs)
+    assert not ambiguous(modes)
+    assert ambiguous(modes, outside=True)
     assert choice.count == np.sum(choice.passed)
     limited = gough.choose_mode(modes, max_swing=np.radians(20))
     assert not limited.ambiguous

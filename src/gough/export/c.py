@@ -10,7 +10,8 @@ from gough.export.template import LICENCE, as_prefix, check_prefix, comment_text
 from gough.platform import Platform
 from gough.status import Event, Status
 
-STATUSES = tuple(Status)[: Status.INVALID_INPUT + 1]  # the others take a proof or a search
+# those that take neither a proof nor a search
+STATUSES = tuple(s for s in Status if s not in (Status.CERTIFIED, Status.AMBIGUOUS))
 TEMPLATES = ("hexapod.h", "hexapod.c", "hexapod_example.c", "hexapod_test.c")
 READINGS = {
     "telescopic": "leg lengths [{unit}]",
@@ -56,7 +57,7 @@ def places_of(platform: Platform, prefix: str, kind: Precision) -> dict[str, str
         "starts": str(START_COUNT),
         "status": _members(STATUSES, prefix),
         "event": _members(tuple(Event), prefix),
-        "status_labels": ", ".join(f'"{status.label}"' for status in STATUSES),
+        "status_labels": ", ".join(f'[{int(s)}] = "{s.label}"' for s in STATUSES),
         "event_labels": ", ".join(f'"{event.label}"' for event in Event),
         "constants": constant_lines(platform, kind),
     }

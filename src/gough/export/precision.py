@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from gough import home_mode
 from gough.errors import GoughError
 from gough.fk.solve import Solver
 from gough.kernel import descent, equations
@@ -29,6 +30,7 @@ class Precision:
     negligible: float  # damping below which the pivoted solve takes over
     tiny: float  # stands for a strut of length zero
     slack: float  # keeps poses on the faces of the workspace inside, [1] and [rad]
+    tip_slack: float  # within which two places of a motor arm's tip are the same
     cosine_slack: float  # rounding of a cosine that is compared with that of a limit
     rounding: float  # of a strut's length, at most
     pose_error: float  # of a pose far from singularities, at most: share of the size, and [rad]
@@ -55,13 +57,13 @@ PRECISIONS = {
     "double": Precision(
         "double", "", tolerance=Solver.tolerance, small_step=equations.SETTLED,
         negligible=descent.NEGLIGIBLE, tiny=1e-300, slack=SLACK,
-        cosine_slack=4e-16, rounding=1e-14, pose_error=1e-12,
+        tip_slack=home_mode.SAME_TIP, cosine_slack=4e-16, rounding=1e-14, pose_error=1e-12,
     ),
     # chosen so that rounding (6e-8) neither stops a good pose nor lets a bad one pass: see
     # tests/export/test_c.py
     "float": Precision(
         "float", "f", tolerance=2e-6, small_step=1e-9, negligible=1e-6,
-        tiny=1e-30, slack=2e-6, cosine_slack=4e-7, rounding=1e-6, pose_error=2e-6,
+        tiny=1e-30, slack=2e-6, tip_slack=1e-3, cosine_slack=4e-7, rounding=1e-6, pose_error=2e-6,
     ),
 }  # fmt: skip
 

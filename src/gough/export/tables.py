@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough import quaternion
+from gough import home_mode, quaternion
 from gough.checks import Array
 from gough.export.precision import Precision
 from gough.kernel import cycle, descent, layout
@@ -27,9 +27,9 @@ def constant_lines(platform: Platform, precision: Precision) -> str:
     """
     constants = kernel_constants(platform)
     order = constants[layout.ORDER : layout.ORDER + 6].astype(int)
-    integers = {"ROTARY": int(platform.rotary is not None), "START_COUNT": START_COUNT}
+    integers = {"ROTARY": platform.rotary is not None, "STATED": platform.workspace is not None}
     lines = [*_arithmetic(precision), "", *_limits(precision), ""]
-    lines += [f"#define {name} {value}" for name, value in integers.items()]
+    lines += [f"#define {name} {int(value)}" for name, value in integers.items()]
     lines.append(f"static const int LEG_ORDER[6] = {{{', '.join(map(str, order))}}};")
     for name, value in _tables(platform, _loosened(constants, platform, precision), order).items():
         lines.append(_definition(name, np.asarray(value), precision))
@@ -101,6 +101,8 @@ def _limits(precision: Precision) -> list[str]:
         "DESCENT_STEPS": DESCENT_STEPS,
         "SWEEPS": SWEEPS,
         "MOST_MISSED": 1_000_000,
+        "MOST_POINTS": home_mode.MOST_POINTS,
+        "START_COUNT": START_COUNT,
     }
     numbers = {
         "TOLERANCE": precision.tolerance,
@@ -112,6 +114,9 @@ def _limits(precision: Precision) -> list[str]:
         "HOPELESS": descent.HOPELESS,
         "FLAT": descent.FLAT,
         "TINY": precision.tiny,
+        "SHIFT_STEP": home_mode.TRANSLATION_STEP,
+        "TURN_STEP": home_mode.ROTATION_STEP,
+        "SAME_TIP": precision.tip_slack,
     }
     return [f"#define {name} {value}" for name, value in steps.items()] + [
         f"#define {name} {precision.literal(value)}" for name, value in numbers.items()
@@ -127,8 +132,9 @@ def _loosened(c: Array, platform: Platform, precision: Precision) -> Array:
     unit = 1.0 if platform.rotary is not None else platform.size
     outward = np.tile([-1.0, 1.0], 6) / np.repeat(np.abs(platform.gain), 2)
     loose[layout.STROKE : layout.STROKE + 12] += extra * unit * outward
-    if extra > 0 and platform.workspace is not None:
-        low, high = np.radians(platform.workspace.rotation_deg.T)
+    box = platform.workspace or home_mode.sure_workspace(platform)
+    if extra > 0 and box is not None:
+        low, high = np.radians(box.rotation_deg.T)
         half = (high - low) / 2 + precision.slack
         cosine = np.cos(np.minimum(half, np.pi)) - precision.cosine_slack
         loose[layout.BOX_X + 2 : layout.BOX_X + 9 : 3] = np.where(half >= np.pi, -2.0, cosine)

@@ -36,8 +36,8 @@ from gough.files.plausible import check_plausible
 from gough.files.report import Report
 from gough.files.rows import Block, Reading, Sink, Source
 from gough.fk.solution import solution_columns
+from gough.home_mode import pose_status
 from gough.kinematics import leg_lengths
-from gough.limit_rules import pose_status
 from gough.platform import Platform
 from gough.pose import poses_from_columns
 from gough.status import InverseStatus, Status

@@ -24,8 +24,8 @@ from gough.errors import InputError
 from gough.files.formats import Given, open_source
 from gough.files.plausible import check_plausible
 from gough.files.rows import Block, Reading, Source
+from gough.home_mode import pose_status
 from gough.kinematics import leg_lengths
-from gough.limit_rules import pose_status
 from gough.platform import Platform
 from gough.pose import Pose, poses_from_columns
 from gough.status import InverseStatus, Outcome, Status

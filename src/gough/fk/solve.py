@@ -15,7 +15,7 @@ from gough.kernel.constants import SINGULAR, kernel_constants
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
 from gough.kernel.rows import STEPS, solve_rows
 from gough.kernel.threads import in_parts
-from gough.kinematics import pose_covariance
+from gough.kinematics import home_sign, pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.seeds.base import PoseSeed, Seed, Start, find_seed, further_starts, starting_poses
@@ -141,8 +141,8 @@ class Solver:
                 `Solution.radius` is the distance within which no other pose has these legs.
             ambiguous: look for every other pose with the same readings (see `assembly_modes`; it
                 takes hundreds of times as long) and call a usable row AMBIGUOUS where one of
-                them could be the machine's too: in workspace and stroke, with home's sign of
-                det J.
+                them could be the machine's too: in the workspace, with home's sign of det J.
+                Done for every row where home is singular, since nothing else tells then.
 
         Returns:
             Solution: batch axes as those of `legs`; (N,) for a table.
@@ -163,9 +163,9 @@ class Solver:
             invalid = self._solve_blocks(flat, start, rows)
         if invalid:
             rows.fill_invalid_with_nan()
+        if ambiguous or self._is_unsure:
+            self._consult_modes(flat, rows)
         radius = self._certify(flat, rows) if certify else None
-        if ambiguous:
-            self._mark_ambiguous(flat, rows)
         batch = readings.shape[:-1]
         return _solution(self.platform, rows, radius, batch, leg_noise, table_info(legs))
 
@@ -176,6 +176,34 @@ class Solver:
         """
         legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
         replace(self, seed="home")(legs, certify=certify)
+
+    @property
+    def _is_unsure(self) -> bool:
+        """True where det J cannot tell modes apart, and no given pose does."""
+        given = isinstance(self.seed, PoseSeed) or not self.max_iterations
+        return not given and not home_sign(self.platform)
+
+    def _consult_modes(self, legs: Array, rows: Rows) -> None:
+        """Set usable rows to AMBIGUOUS whose readings another pose of the machine could have.
+
+        Where home is singular, the pose of each becomes the mode that fits best.
+        """
+        from gough.modes.assembly import assembly_modes
+        from gough.modes.choose import ambiguous, choose_mode
+
+        usable = np.flatnonzero(np.isin(rows.status, USABLE))
+        if not len(usable):
+            return
+        modes = assembly_modes(self.platform, legs[usable], workers=self.workers)
+        if self._is_unsure:
+            best = choose_mode(modes).best
+            chosen = usable[modes.row[best]]
+            rows.put(chosen, replace(self, seed=modes.pose[best])(legs[chosen]))
+        pose = Pose.trusted(rows.position[usable], rows.wxyz[usable])
+        unknown = ambiguous(modes, ~self.platform.in_workspace(pose))
+        if self._is_unsure:
+            unknown |= ~modes.complete
+        rows.status[usable[unknown]] = Status.AMBIGUOUS
 
     def _solve_blocks(self, legs: Array, start: Start, rows: Rows) -> int:
         """Take plain Newton steps on all rows, then solve those that it leaves open.
@@ -235,14 +263,6 @@ class Solver:
         rows.status[(radius > 0) & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
         return radius
 
-    def _mark_ambiguous(self, legs: Array, rows: Rows) -> None:
-        """Set usable rows to AMBIGUOUS whose readings another pose of the machine could have."""
-        from gough.modes.choose import ambiguous
-
-        usable = np.flatnonzero(np.isin(rows.status, USABLE))
-        if len(usable):
-            rows.status[usable[ambiguous(self.platform, legs[usable])]] = Status.AMBIGUOUS
-
 
 @dataclass(frozen=True, eq=False)
 class Rows:
@@ -265,6 +285,12 @@ class Rows:
     def arrays(self) -> tuple:
         """Arguments of the compiled code."""
         return self.position, self.wxyz, self.residual, self.iterations, self.status
+
+    def put(self, chosen: NDArray[np.intp], found: Solution) -> None:
+        """Set chosen rows (K,) to the results of K rows."""
+        self.position[chosen], self.wxyz[chosen] = found.pose.position, found.pose.wxyz
+        self.residual[chosen], self.status[chosen] = found.residual, found.status
+        self.iterations[chosen] += found.iterations
 
     def fill_invalid_with_nan(self) -> None:
         """Set all results of invalid rows to NaN."""

@@ -188,11 +188,16 @@ class Tracker:
         self._limits[2] = (self._max_shift * cycles) ** 2
         self._limits[3] = np.sin(turn / 2) ** 2
 
-    def _set_pose(self, pose: Pose) -> None:
-        """Make a pose the present one."""
+    def _set_pose(self, pose: Pose, *, trusted: bool = True) -> None:
+        """Make a pose the present one.
+
+        Args:
+            trusted: its assembly mode is the machine's.
+        """
         self._state[0, :7] = to_internal(self._constants, pose)
         home = self._constants[layout.HOME_SIGN]
         self._state[0, 7] = float(assembly_sign(self.platform, pose)) * home
+        self._state[0, 8] = float(trusted)
         self._position[0], self._wxyz[0] = pose.position, pose.wxyz
         self._reset_missed()
 
@@ -206,17 +211,18 @@ class Tracker:
             self._code, self.event = int(Status.INVALID_INPUT), Event.HELD
             return
         found = self._solver(self._legs[0])
-        self._code = int(found.status)
-        if self._code > Status.OUTSIDE_WORKSPACE:
+        self._code, usable = int(found.status), bool(found.usable)
+        if not usable and self._code not in (Status.OTHER_MODE, Status.AMBIGUOUS):
             self.event = Event.HELD
             return
         self._agreeing = self._agreeing + 1 if self._agrees(found.pose) else 1
         self._candidate = found.pose
-        if self._lost or self._agreeing >= self._confirm:
-            self._set_pose(found.pose)
+        if (self._lost and usable) or self._agreeing >= self._confirm:
+            self._set_pose(found.pose, trusted=usable)
             self._lost, self.event = False, Event.FOUND
             return
-        self.event = Event.MODE_CHANGED if code == CROSSED else Event.JUMPED
+        held = Event.HELD if self._lost else Event.JUMPED
+        self.event = Event.MODE_CHANGED if code == CROSSED else held
 
     def _agrees(self, pose: Pose) -> bool:
         """Return whether a pose is within one cycle's motion of the candidate."""

@@ -150,7 +150,7 @@ def _store(constants, buffer, legs, valid, start, last, tolerance, out):
         iterations[row] = int(buffer[COUNT * WIDTH + k])
         status = CONVERGED if in_stroke(constants, legs, row) else OUTSIDE_STROKE
         solved = buffer[RESIDUAL * WIDTH + k] <= tolerance
-        if not solved or buffer[INSIDE * WIDTH + k] == 0.0 or buffer[REGULAR * WIDTH + k] == 0.0:
+        if not solved or buffer[INSIDE * WIDTH + k] < 1.0 or buffer[REGULAR * WIDTH + k] == 0.0:
             status = OPEN
         if valid[k] == 0.0:
             status = INVALID_INPUT

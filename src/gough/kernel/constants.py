@@ -8,12 +8,18 @@ import numpy as np
 
 from gough import limit_rules, quaternion
 from gough.checks import Array
+from gough.home_mode import sure_workspace
 from gough.kernel import layout
-from gough.kinematics import equivalent_struts, joint_positions, joint_radius, normalised_jacobian
+from gough.kinematics import (
+    SINGULAR,
+    equivalent_struts,
+    home_sign,
+    joint_positions,
+    joint_radius,
+    normalised_jacobian,
+)
 from gough.platform import Platform
 from gough.pose import Pose
-
-SINGULAR = 1e-3  # distance to singularity below which a pose is called close to one
 
 
 @lru_cache(maxsize=256)
@@ -49,6 +55,7 @@ def kernel_constants(platform: Platform, singular: float = SINGULAR) -> Array:
         put(layout.ROD, arms.rod_length[order] / size)
         put(layout.ARM_X, (arms.arm_length[:, None] / size * arms.axis_x)[order])
         put(layout.ARM_Y, (arms.arm_length[:, None] / size * arms.axis_y)[order])
+        put(layout.BRANCH, arms.branch[order])
     put(layout.GAIN, platform.gain[order])
     put(layout.ZERO, platform.true_at_zero[order])
     put(layout.HOME_POSITION, (platform.home.position - c[layout.ORIGIN :][:3]) / size)
@@ -59,23 +66,29 @@ def kernel_constants(platform: Platform, singular: float = SINGULAR) -> Array:
     # |J|_F^2 <= 12: six unit vectors, and moments whose squares sum to at most six.
     put(layout.REGULAR_DETERMINANT, singular / (5 / 12) ** 2.5)
     at_home = normalised_jacobian(platform, platform.home)[order]
-    put(layout.HOME_SIGN, np.sign(np.linalg.det(at_home)))
+    put(layout.HOME_SIGN, np.sign(np.linalg.det(at_home)) * abs(home_sign(platform)))
     c.flags.writeable = False
     return c
 
 
 def _put_workspace(put, platform: Platform) -> None:
-    """Store the box of the workspace, widened by the slack of `limit_rules`."""
+    """Store the box of the workspace, widened by the slack of `limit_rules`.
+
+    A platform that states none gets the box in which poses are surely in home's mode, so that only
+    poses beyond it have to be looked at one by one.
+    """
     slack = limit_rules.SLACK
-    if platform.workspace is None:
+    workspace = platform.workspace or sure_workspace(platform)
+    put(layout.STATED, float(platform.workspace is not None))
+    if workspace is None:
         put(layout.BOX_LOW, np.full(3, -np.inf))
         put(layout.BOX_HIGH, np.full(3, np.inf))
         put(layout.BOX_X, np.tile([1.0, 0.0, -2.0], (3, 1)))
         return
-    low, high = platform.workspace.translation.T / platform.size
+    low, high = workspace.translation.T / platform.size
     put(layout.BOX_LOW, low - slack)
     put(layout.BOX_HIGH, high + slack)
-    low, high = np.radians(platform.workspace.rotation_deg.T)
+    low, high = np.radians(workspace.rotation_deg.T)
     middle, half = (low + high) / 2, (high - low) / 2 + slack
     # a cosine cannot tell angles below 1e-8 apart; -2 admits every angle
     limit = np.where(half >= np.pi, -2.0, np.cos(np.minimum(half, np.pi)) - 4e-16)

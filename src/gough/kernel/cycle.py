@@ -6,7 +6,16 @@ import numpy as np
 
 from gough.kernel.equations import newton
 from gough.kernel.jit import jit
-from gough.kernel.layout import DETERMINANT, FIRST, OPEN, QUATERNION, SINGLE, USER_POSITION
+from gough.kernel.layout import (
+    DETERMINANT,
+    FIRST,
+    HOME_SIGN,
+    INSIDE,
+    OPEN,
+    QUATERNION,
+    SINGLE,
+    USER_POSITION,
+)
 from gough.kernel.pose_io import get_pose, put_pose, put_reading, put_user_position
 from gough.kernel.rows import status_of_pose
 
@@ -17,7 +26,7 @@ CROSSED = OPEN + 2  # a singularity lies between the pose and the last
 BAD_READING = OPEN + 3  # not finite, or not above zero
 
 STEPS = np.int64(12)  # a warm start needs one to three
-STATE = 8  # internal pose 7, sign of the determinant 1
+STATE = 9  # internal pose 7; sign of the determinant; 1 where the mode is the machine's, else 0
 
 
 @jit()
@@ -52,5 +61,7 @@ def cycle(constants, legs, state, limits, buffer, work, position, wxyz):
     for i in range(7):
         state[0, i] = buffer[i]
     state[0, 7] = 1.0 if buffer[DETERMINANT] > 0 else -1.0
+    if buffer[INSIDE] == 1.0 and constants[HOME_SIGN] != 0.0:
+        state[0, 8] = 1.0
     get_pose(buffer, FIRST, SINGLE, position, wxyz, FIRST)
-    return status_of_pose(constants, buffer, legs, FIRST, limits[1], work)
+    return status_of_pose(constants, buffer, legs, FIRST, limits[1], state[0, 8] == 1.0, work)

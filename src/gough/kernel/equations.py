@@ -254,7 +254,7 @@ def _angle_within(constants, box, sine, cosine):
 
 @inline
 def assess(constants, buffer, k, stride):
-    """Store the residual of pose k, whether it is inside, and whether it is surely regular.
+    """Store the residual of pose k, where it is, and whether it is surely regular.
 
     The determinant is that of the last Newton step's start, which at the end of a converged
     iteration is the pose itself to half its digits. The box of the workspace repeats
@@ -282,7 +282,7 @@ def assess(constants, buffer, k, stride):
     regular = abs(determinant) > constants[REGULAR_DETERMINANT] * product * (rho * rho * rho)
     buffer[REGULAR * stride + k] = 1.0 if regular else 0.0
 
-    inside = 1.0 if determinant * constants[HOME_SIGN] > 0 else 0.0
+    inside = 1.0 if determinant * constants[HOME_SIGN] >= 0 else 0.5
     p = turned(R, constants[PIVOT], constants[PIVOT + 1], constants[PIVOT + 2])
     x0 = buffer[k] + p[0] - constants[HOME_POSITION]
     x1 = buffer[stride + k] + p[1] - constants[HOME_POSITION + 1]

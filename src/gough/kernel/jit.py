@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numba
 
-from gough import status
+from gough import home_mode, status
 
 Function = TypeVar("Function", bound=Callable)
 
@@ -72,13 +72,14 @@ def inline(function: Callable) -> Any:
 def _expire_with_sources(compiled, folder: Path) -> None:
     """Let cached code expire when a source that may be compiled into it changes.
 
-    Those are the sources beside the function, those of this folder and the numbers of the
-    statuses. Numba itself looks at the function's own file only; a change in a function that
-    was compiled into it (`equations.py`, say) would go unnoticed and old code would run on.
+    Those are the sources beside the function, those of this folder, the numbers of the statuses
+    and the steps of `home_mode`. Numba itself looks at the function's own file only; a change in a
+    function that was compiled into it (`equations.py`, say) would go unnoticed and old code would
+    run on.
     """
     file = compiled._cache._cache_file
-    sources = (_digest(folder), _digest(Path(__file__).parent), _digest(Path(status.__file__)))
-    file._source_stamp = (file._source_stamp, *sources)
+    paths = folder, Path(__file__).parent, *(Path(inspect.getfile(m)) for m in (status, home_mode))
+    file._source_stamp = (file._source_stamp, *map(_digest, paths))
 
 
 @lru_cache

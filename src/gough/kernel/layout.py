@@ -15,7 +15,7 @@ LENGTH = 9  # l: 6
 SQUARE = 15  # l^2: 6
 BASE = 21  # b: 6 x 3
 RESIDUAL = 39  # largest | |d_i| - l_i |
-INSIDE = 40  # 1 in the workspace and on home's side of all singularities, else 0
+INSIDE = 40  # 0 outside the workspace; in it 1 where the determinant has home's sign, else 0.5
 REGULAR = 41  # 1 where the distance to singularity is surely above the threshold, else 0
 COUNT = 42  # Newton steps taken
 USER_POSITION = 43  # position as the user sees it [platform unit]: 3
@@ -31,7 +31,7 @@ YES = np.bool_(True)
 # The constants of a platform, made in `constants.py`. Lengths are divided by its size.
 JOINTS = 0  # q: platform joints from their centre, legs in solving order: 6 x 3
 RADIUS = 18  # root mean square of |q_i|
-HOME_SIGN = 19  # sign of the determinant at home
+HOME_SIGN = 19  # sign of the determinant at home, 0 where home is singular
 REGULAR_DETERMINANT = 20  # of the unit-free Jacobian: above it a pose is surely regular
 HOME_POSITION = 21  # origin of the workspace's box, in its axes: 3
 PIVOT = 24  # pivot from the centre of the platform joints: 3
@@ -53,6 +53,8 @@ HOME_POSE = 129  # in internal coordinates: position 3, quaternion 4
 HOME_READINGS = 136  # as they come: 6
 STROKE = 142  # lowest and highest reading, as they come, widened: 6 x 2
 PER_SIZE = 154  # 1 / SIZE, made once: compilers may turn x (1 / y) into x / y in one loop only
-CONSTANTS = 155
+BRANCH = 155  # +1 or -1, see `gough.RotaryArms`: 6
+STATED = 161  # 1 where the platform states its workspace, else 0
+CONSTANTS = 162
 
 OPEN = 100  # in place of a status: the row still needs the row solver

@@ -11,6 +11,7 @@ import numpy as np
 
 from gough.kernel.descent import SOLVED, STATIONARY, UNFINISHED, descend, strut_errors
 from gough.kernel.equations import assess, newton
+from gough.kernel.home_mode import reached_from
 from gough.kernel.jit import inner, jit
 from gough.kernel.layout import (
     BASE,
@@ -18,6 +19,8 @@ from gough.kernel.layout import (
     COUNT,
     DETERMINANT,
     FIRST,
+    HOME_POSE,
+    HOME_SIGN,
     INSIDE,
     JOINTS,
     LENGTH,
@@ -26,6 +29,7 @@ from gough.kernel.layout import (
     RESIDUAL,
     SINGLE,
     SIZE,
+    STATED,
 )
 from gough.kernel.linear import pivoted_solve, smallest_singular_value
 from gough.kernel.pose_io import get_pose, in_stroke, put_pose, put_reading, put_user_position
@@ -34,10 +38,15 @@ from gough.status import Status
 CONVERGED, OUTSIDE_STROKE = int(Status.CONVERGED), int(Status.OUTSIDE_STROKE)
 NEAR_SINGULARITY, OUTSIDE_WORKSPACE = int(Status.NEAR_SINGULARITY), int(Status.OUTSIDE_WORKSPACE)
 UNREACHABLE, NOT_CONVERGED = int(Status.UNREACHABLE), int(Status.NOT_CONVERGED)
-INVALID_INPUT = int(Status.INVALID_INPUT)
+INVALID_INPUT, AMBIGUOUS = int(Status.INVALID_INPUT), int(Status.AMBIGUOUS)
+OTHER_MODE = int(Status.OTHER_MODE)
 
 STEPS = np.int64(10)  # of plain Newton, in blocks too, before the damped method tries
-ENOUGH_STARTS = 8  # after which a pose outside the workspace is taken for the answer
+# Further starts after which a pose is taken for the answer: one in another assembly mode, and one
+# in home's, but outside the workspace.
+ENOUGH_STARTS, FEW_STARTS = 8, 2
+# Ranks of poses: the machine's is looked for in this order.
+NO_POSE, OTHER, OURS, WITHIN = 0, 1, 2, 3  # OURS: home's mode; WITHIN: in the workspace, too
 PATIENCE = 6  # times the limit, for the last look at a row that no start settled
 
 
@@ -49,7 +58,7 @@ def solve_rows(constants, legs, rows, guess, starts, settings, work, out):
         rows: (K,) which rows of legs (N, 6).
         guess: (K, 7) internal poses that each row tries first.
         starts: (S, 7) internal poses tried next, in order, until one leads into the workspace
-            on home's side of the singularities.
+            and home's assembly mode.
         settings: (4,) tolerance as a share of the platform's size; limit of steps from each
             start; distance to singularity below which a pose is called near one; 1 if a row
             stays in the assembly mode that plain Newton reaches from its guess, else 0.
@@ -69,9 +78,12 @@ def solve_rows(constants, legs, rows, guess, starts, settings, work, out):
             statuses[row] = INVALID_INPUT
             invalid += 1
             continue
-        outcome, count = _solve_row(constants, buffer, guess, n, starts, settings, matrices, best)
+        outcome, count, rank = _solve_row(
+            constants, buffer, guess, n, starts, settings, matrices, best
+        )
         if outcome == SOLVED:
-            status = status_of_pose(constants, buffer, legs, row, settings[2], matrices)
+            ours = rank >= OURS
+            status = status_of_pose(constants, buffer, legs, row, settings[2], ours, matrices)
         else:
             status = UNREACHABLE if outcome == STATIONARY else NOT_CONVERGED
         statuses[row] = status
@@ -86,21 +98,25 @@ def solve_rows(constants, legs, rows, guess, starts, settings, work, out):
 def _solve_row(constants, buffer, guess, n, starts, settings, work, best):
     """Solve the reading in `buffer`, from guess n and then from the starts; leave the pose there.
 
-    Taken is the first pose inside the workspace; else the first with these lengths; else the
-    one that misses them least.
+    Taken is the first pose inside the workspace; else the first in home's mode; else the first
+    with these lengths; else the one that misses them least. A platform that states no workspace
+    has all of home's mode for it.
 
     Returns:
-        SOLVED, STATIONARY or UNFINISHED, and the steps taken in all.
+        SOLVED, STATIONARY or UNFINISHED, the steps taken in all, and the rank of the pose.
     """
     tolerance, limit = settings[0], int(settings[1])
     put_pose(buffer, FIRST, SINGLE, guess, n)
-    chosen, least, total, first, tries = UNFINISHED, inf, 0, 0, len(starts)
+    chosen, least, total, first, tries, rank = UNFINISHED, inf, 0, 0, len(starts), NO_POSE
+    enough = WITHIN if constants[STATED] == 1.0 else OURS
+    stays = settings[3] == 1.0
     if limit > 0:
         solved = newton(constants, buffer, tolerance, STEPS if limit > STEPS else limit)
         total = int(buffer[COUNT])
-        if solved and (buffer[INSIDE] == 1.0 or settings[3] == 1.0):
-            return SOLVED, total
         if solved:
+            rank = _rank(constants, buffer, guess, n, stays, work)
+            if stays or rank >= enough:
+                return SOLVED, total, rank
             chosen, first = SOLVED, 1
             _copy(buffer, best)
         put_pose(buffer, FIRST, SINGLE, guess, n)
@@ -112,21 +128,43 @@ def _solve_row(constants, buffer, guess, n, starts, settings, work, best):
         outcome, count, error = descend(constants, buffer, work, tolerance, limit)
         total += count
         _measure(constants, buffer, work)
-        if outcome == SOLVED and buffer[INSIDE] == 1.0:
-            return outcome, total
-        if chosen == SOLVED and attempt >= ENOUGH_STARTS:
-            break
-        if attempt == 0 or (chosen != SOLVED and (outcome == SOLVED or error < least)):
-            chosen, least = outcome, error
+        found = _rank(constants, buffer, guess, n, stays, work) if outcome == SOLVED else NO_POSE
+        if found >= enough:
+            return outcome, total, found
+        if attempt == 0 or found > rank or (rank == NO_POSE and error < least):
+            chosen, least, rank = outcome, error, found
             _copy(buffer, best)
+        if chosen == SOLVED and attempt >= (FEW_STARTS if rank == OURS else ENOUGH_STARTS):
+            break
     _copy(best, buffer)
     if chosen == UNFINISHED and tries > 0:  # a pose, or a miss? A longer look, once
         chosen, count, error = descend(constants, buffer, work, tolerance, PATIENCE * limit)
         total += count
         _measure(constants, buffer, work)
+        rank = _rank(constants, buffer, guess, n, stays, work) if chosen == SOLVED else NO_POSE
     if hopeless and chosen != SOLVED:
         chosen = STATIONARY
-    return chosen, total
+    return chosen, total, rank
+
+
+@inner
+def _rank(constants, buffer, guess, n, stays, work):
+    """Return how far the assessed pose in `buffer` is to be believed: WITHIN, OURS or OTHER."""
+    if buffer[INSIDE] == 1.0:
+        return WITHIN
+    start = work[3, 2], work[3, 3]
+    for i in range(3):
+        start[0][i] = constants[HOME_POSE + i]
+    for i in range(4):
+        start[1][i] = constants[HOME_POSE + 3 + i]
+    ours = reached_from(constants, buffer, start, work)
+    if stays and not ours:
+        for i in range(3):
+            start[0][i] = guess[n, i]
+        for i in range(4):
+            start[1][i] = guess[n, 3 + i]
+        ours = reached_from(constants, buffer, start, work)
+    return OURS if ours else OTHER
 
 
 @inner
@@ -148,15 +186,22 @@ def _measure(constants, buffer, work):
 
 
 @inner
-def status_of_pose(constants, buffer, legs, row, singular, work):
-    """Return the status of the assessed pose in `buffer`, which has the readings of the row."""
-    if buffer[INSIDE] == 0.0:
-        return OUTSIDE_WORKSPACE
+def status_of_pose(constants, buffer, legs, row, singular, ours, work):
+    """Return the status of the assessed pose in `buffer`, which has the readings of the row.
+
+    Args:
+        ours: the pose is in the machine's assembly mode, as far as is known.
+    """
+    if not ours:
+        return OTHER_MODE if constants[HOME_SIGN] != 0.0 else AMBIGUOUS
     if buffer[REGULAR] == 0.0:
         strut_errors(constants, buffer, work[0], work[3, 0])
         if smallest_singular_value(work[0], work[2]) < singular:
             return NEAR_SINGULARITY
-    return CONVERGED if in_stroke(constants, legs, row) else OUTSIDE_STROKE
+    if not in_stroke(constants, legs, row):
+        return OUTSIDE_STROKE
+    beyond = constants[STATED] == 1.0 and buffer[INSIDE] == 0.0
+    return OUTSIDE_WORKSPACE if beyond else CONVERGED
 
 
 @inner

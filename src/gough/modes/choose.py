@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from gough import quaternion
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
-from gough.kinematics import joint_positions, leg_lengths
+from gough.kinematics import home_sign, joint_positions, leg_lengths
 from gough.limit_rules import in_stroke
-from gough.modes.assembly import assembly_modes
 from gough.modes.result import AssemblyModes
 from gough.platform import Platform
 from gough.pose import Pose
 
+LIMITS = ("stroke", "workspace")
 BRANCH_SLACK = 1e-6  # [rad] readings of a pose that agree with the given ones
 
 
@@ -69,8 +68,9 @@ def choose_mode(
 
     Always applied: "side" (the platform joints' centre lies on home's side of the base plate;
     mirror images do not), "sign" (the sign of det J is home's, so no singularity had to be
-    crossed), "stroke" and "workspace" where the platform states them, "branch" for rotary legs
-    (the motors reach the pose on their own branch at these angles).
+    crossed; left out where home itself is singular), "stroke" and "workspace" where the platform
+    states them, "branch" for rotary legs (the motors reach the pose on their own branch at these
+    angles).
 
     Args:
         near: the last known pose, () or one for each set of readings (...): "near" passes poses
@@ -99,7 +99,9 @@ def choose_mode(
     if (up is not None or orientation is not None) and not hint_error > 0:
         raise GoughError("hint_error: expected the sensor's error in rad, above 0, beside a hint")
     platform, pose = modes.platform, modes.pose
-    passes = {"side": same_side(platform, pose), "sign": modes.sign > 0}
+    passes = {"side": same_side(platform, pose)}
+    if home_sign(platform):
+        passes["sign"] = modes.sign > 0
     if platform.stroke is not None:
         passes["stroke"] = in_stroke(platform, modes.readings)
     if platform.workspace is not None:
@@ -124,14 +126,22 @@ def choose_mode(
     return _ranked(modes, passes, translation / platform.size + rotation)
 
 
-def ambiguous(platform: Platform, legs: ArrayLike, **filters: Any) -> NDArray[np.bool_]:
-    """True (...) where more than one pose passes every filter of `choose_mode`.
+def ambiguous(modes: AssemblyModes, outside: ArrayLike = False) -> NDArray[np.bool_]:
+    """True (...) where more than one pose could be the machine's.
+
+    Those are the poses that pass the filters of `choose_mode`, but for the stroke, which all poses
+    of the same readings keep or break alike.
 
     Args:
-        legs: readings (..., 6).
-        filters: as for `choose_mode`.
+        outside: (...) True where the pose that is believed to be the machine's is outside the
+            workspace, so that another one may be, too.
     """
-    return choose_mode(assembly_modes(platform, legs), **filters).ambiguous
+    passes = choose_mode(modes).passes
+    fits = np.logical_and.reduce([p for name, p in passes.items() if name not in LIMITS])
+    batch = modes.legs.shape[:-1]
+    anywhere = np.broadcast_to(outside, batch).ravel()[modes.row]
+    fits &= anywhere | passes.get("workspace", True)
+    return (np.bincount(modes.row[fits], minlength=math.prod(batch)) > 1).reshape(batch)
 
 
 def same_side(platform: Platform, pose: Pose) -> NDArray[np.bool_]:

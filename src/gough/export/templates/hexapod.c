@@ -31,7 +31,8 @@ typedef struct {
     real determinant;  /* of the matrix with rows (d_i, a_i x d_i), at the last step's start */
     real step;         /* squared size of the last Newton step */
     real residual;     /* largest strut error */
-    int inside;        /* in the workspace and on home's side of all singularities */
+    int within;        /* in the workspace */
+    int inside;        /* and the determinant has the sign that it has at home */
     int regular;       /* surely farther from a singularity than SINGULAR */
 } problem;
 
@@ -231,7 +232,7 @@ static int turned_within(const real rot[9])
 static void assess(problem *w)
 {
     real rot[9], arm[3], product = RADIUS * RADIUS * RADIUS;
-    int bad = 0, inside = w->determinant * HOME_SIGN > 0;
+    int bad = 0, within = 1;
     rotation(w->q, rot);
     w->residual = 0;
     for (int i = 0; i < 6; i++) {
@@ -247,9 +248,10 @@ static void assess(problem *w)
     rotated(rot, PIVOT, arm);
     for (int k = 0; k < 3; k++) {
         const real shift = w->s[k] + arm[k] - HOME_SHIFT[k];
-        inside &= shift >= SHIFT_LOW[k] && shift <= SHIFT_HIGH[k];
+        within &= shift >= SHIFT_LOW[k] && shift <= SHIFT_HIGH[k];
     }
-    w->inside = inside & turned_within(rot);
+    w->within = within & turned_within(rot);
+    w->inside = w->within && w->determinant * HOME_SIGN >= 0;
 }
 
 /* Newton's method from where w is; whether it ends at a pose with these lengths.
@@ -473,54 +475,6 @@ static int near_singularity(const problem *w)
     return squared_singularity_distance(w) < SINGULAR * SINGULAR;
 }
 
-/* ---- solve (gough: fk/solve.py) ------------------------------------------------------------ */
-
-static hexapod_status judge(const problem *w, int outcome, const real legs[6])
-{
-    if (outcome == STATIONARY) return HEXAPOD_UNREACHABLE;
-    if (outcome != SOLVED) return HEXAPOD_NOT_CONVERGED;
-    if (!w->inside) return HEXAPOD_OUTSIDE_WORKSPACE;
-    if (!w->regular && near_singularity(w)) return HEXAPOD_NEAR_SINGULARITY;
-    return in_stroke(legs) ? HEXAPOD_CONVERGED : HEXAPOD_OUTSIDE_STROKE;
-}
-
-hexapod_status hexapod_solve(const real legs[6], hexapod_pose *inout, hexapod_info *info)
-{
-    hexapod_status status = HEXAPOD_INVALID_INPUT;
-    problem w;
-    int steps = 0;
-    w.residual = INFINITE;
-    if (take_reading(&w, legs)) {
-        problem newton;
-        real side = 0;
-        int followed, stays, outcome = SOLVED;
-        if (!set_pose(&w, inout)) set_internal(&w, STARTS[0]);
-        newton = w;
-        followed = follow(&newton, &steps, &side);
-        stays = followed && (newton.inside || !(side * HOME_SIGN > 0));
-        if (!stays) { /* Newton's method may have crossed a singularity: damped, it rarely does */
-            if (!(side * HOME_SIGN > 0)) set_internal(&w, STARTS[0]);
-            outcome = descend(&w, &steps);
-        }
-        if (stays || (followed && !(outcome == SOLVED && w.inside))) {
-            w = newton;
-            outcome = SOLVED;
-        }
-        status = judge(&w, outcome, legs);
-        if (status <= HEXAPOD_OUTSIDE_WORKSPACE) get_pose(&w, inout);
-    }
-    if (info) {
-        info->residual = w.residual * SIZE;
-        info->steps = steps;
-    }
-    return status;
-}
-
-int hexapod_usable(hexapod_status status)
-{
-    return status <= HEXAPOD_NEAR_SINGULARITY;
-}
-
 /* ---- inverse kinematics (gough: kinematics.py) --------------------------------------------- */
 
 #if ROTARY
@@ -575,6 +529,100 @@ static int reach(problem *w, real legs[6], real rates[6])
     }
     return missing;
 }
+
+/* ---- home's assembly mode (gough: home_mode.py) --------------------------------------------- */
+
+/* Whether the determinant has home's sign all along the straight way from an internal pose to that
+ * in `end`, and the motors reach all of it. */
+static int reached_from(const problem *end, const real from[7])
+{
+    problem w;
+    real step[7], legs[6], rates[6], J[36], r[6], A[36], x[6], shift, turn, steps;
+    const real along = from[3] * end->q[0] + from[4] * end->q[1] + from[5] * end->q[2] +
+                       from[6] * end->q[3];
+    int count;
+    for (int k = 0; k < 3; k++) step[k] = end->s[k] - from[k];
+    for (int k = 3; k < 7; k++) step[k] = (along < 0 ? -end->q[k - 3] : end->q[k - 3]) - from[k];
+    shift = SQRT(dot(step, step)) / SHIFT_STEP;
+    turn = 2 * SQRT(dot(step + 3, step + 3) + step[6] * step[6]) / TURN_STEP;
+    steps = shift > turn ? shift : turn;
+    count = steps < MOST_POINTS ? 1 + (int)steps : MOST_POINTS;
+    for (int n = 1; n <= count; n++) {
+        real at[7];
+        for (int k = 0; k < 7; k++) at[k] = from[k] + step[k] * (real)n / (real)count;
+        memcpy(w.s, at, sizeof w.s);
+        put_quaternion(&w, at[3], at[4], at[5], at[6]);
+        if (reach(&w, legs, rates)) return 0;
+        (void)strut_errors(&w, J, r);
+        if (!(solve_plain(J, r, A, x) * HOME_SIGN >= 0)) return 0;
+    }
+    for (int i = 0; i < 6; i++) { /* motors on another branch have other tips */
+        for (int k = 0; k < 3; k++) {
+            if (FABS(w.base[i][k] - end->base[i][k]) > SAME_TIP) return 0;
+        }
+    }
+    return 1;
+}
+
+/* ---- solve (gough: fk/solve.py) ------------------------------------------------------------ */
+
+/* `ours`: the pose is in the machine's assembly mode, as far as is known. */
+static hexapod_status judge(const problem *w, int outcome, int ours, const real legs[6])
+{
+    if (outcome == STATIONARY) return HEXAPOD_UNREACHABLE;
+    if (outcome != SOLVED) return HEXAPOD_NOT_CONVERGED;
+    if (!ours) return HEXAPOD_OTHER_MODE;
+    if (!w->regular && near_singularity(w)) return HEXAPOD_NEAR_SINGULARITY;
+    if (!in_stroke(legs)) return HEXAPOD_OUTSIDE_STROKE;
+    return STATED && !w->within ? HEXAPOD_OUTSIDE_WORKSPACE : HEXAPOD_CONVERGED;
+}
+
+static int has_pose(hexapod_status status)
+{
+    return status <= HEXAPOD_OUTSIDE_WORKSPACE || status == HEXAPOD_OTHER_MODE;
+}
+
+hexapod_status hexapod_solve(const real legs[6], hexapod_pose *inout, hexapod_info *info)
+{
+    hexapod_status status = HEXAPOD_INVALID_INPUT;
+    problem w;
+    int steps = 0;
+    w.residual = INFINITE;
+    if (take_reading(&w, legs)) {
+        problem newton;
+        real side = 0;
+        real from[7];
+        int followed, stays, ours, outcome = SOLVED;
+        if (!set_pose(&w, inout)) set_internal(&w, STARTS[0]);
+        get_internal(&w, from);
+        newton = w;
+        followed = follow(&newton, &steps, &side);
+        stays = followed && (newton.inside || !(side * HOME_SIGN > 0));
+        if (!stays) { /* Newton's method may have crossed a singularity: damped, it rarely does */
+            if (!(side * HOME_SIGN > 0)) set_internal(&w, STARTS[0]);
+            outcome = descend(&w, &steps);
+        }
+        if (stays || (followed && !(outcome == SOLVED && w.inside))) {
+            w = newton;
+            outcome = SOLVED;
+        }
+        ours = w.inside || reached_from(&w, STARTS[0]) || reached_from(&w, from);
+        status = judge(&w, outcome, ours, legs);
+        if (has_pose(status)) get_pose(&w, inout);
+    }
+    if (info) {
+        info->residual = w.residual * SIZE;
+        info->steps = steps;
+    }
+    return status;
+}
+
+int hexapod_usable(hexapod_status status)
+{
+    return status <= HEXAPOD_OUTSIDE_WORKSPACE;
+}
+
+/* ---- inverse kinematics, for the user -------------------------------------------------------- */
 
 int hexapod_inverse(const hexapod_pose *pose, real legs[6])
 {
@@ -652,24 +700,26 @@ static int far_apart(const hexapod_pose *a, const hexapod_pose *b, real shift, r
 /* Look for the pose of a reading that cannot be followed, from one start. */
 static hexapod_status search(hexapod_tracker *t, problem *w, const real legs[6])
 {
-    int outcome;
+    int outcome, ours;
     if (t->next_start < START_COUNT) set_internal(w, STARTS[t->next_start]);
     else (void)set_pose(w, &t->candidate);
     outcome = descend(w, &t->info.steps);
     t->info.residual = w->residual * SIZE;
-    return judge(w, outcome, legs);
+    ours = outcome == SOLVED && (w->inside || reached_from(w, STARTS[0]));
+    return judge(w, outcome, ours, legs);
 }
 
 /* Whether enough readings agree on the pose in w, far from the present one. */
 static int confirmed(hexapod_tracker *t, const problem *w)
 {
+    const int usable = hexapod_usable(t->status);
     hexapod_pose found;
     int agrees = 0;
     get_pose(w, &found);
     if (t->has_candidate) {
         agrees = !far_apart(&t->candidate, &found, t->max_shift, t->max_turn);
     }
-    if (!w->inside && t->next_start < START_COUNT) { /* look for one inside from all starts first */
+    if (!(STATED ? w->inside : usable) && t->next_start < START_COUNT) { /* try all starts first */
         if (!t->has_candidate) t->candidate = found;
         t->has_candidate = 1;
         t->agreeing = 0;
@@ -679,7 +729,7 @@ static int confirmed(hexapod_tracker *t, const problem *w)
     t->candidate = found;
     t->has_candidate = 1;
     t->agreeing = agrees ? t->agreeing + 1 : 1;
-    return t->lost || t->agreeing >= t->confirm;
+    return (t->lost && usable) || t->agreeing >= t->confirm;
 }
 
 /* Whether Newton's method from the present pose ends within the motion of `cycles` cycles; `crossed`:
@@ -716,11 +766,12 @@ hexapod_event hexapod_update(hexapod_tracker *t, const real legs[6])
         return t->event;
     }
     if (!t->lost && followed(t, &w, cycles, &crossed, &found)) {
-        t->status = judge(&w, SOLVED, legs);
+        if (w.inside) t->trusted = 1;
+        t->status = judge(&w, SOLVED, t->trusted, legs);
         t->event = HEXAPOD_FOLLOWED;
     } else {
-        t->status = found ? judge(&w, SOLVED, legs) : search(t, &w, legs);
-        if (t->status > HEXAPOD_OUTSIDE_WORKSPACE) { /* next time from another start */
+        t->status = found ? judge(&w, SOLVED, 1, legs) : search(t, &w, legs);
+        if (!has_pose(t->status)) { /* next time from another start */
             t->next_start = t->next_start < START_COUNT - !t->has_candidate ? t->next_start + 1 : 0;
             if (t->next_start == 0) t->has_candidate = 0;
             return t->event;
@@ -730,6 +781,7 @@ hexapod_event hexapod_update(hexapod_tracker *t, const real legs[6])
             return t->event;
         }
         t->lost = 0;
+        t->trusted = hexapod_usable(t->status);
         t->event = HEXAPOD_FOUND;
     }
     get_internal(&w, t->at);
@@ -751,6 +803,7 @@ void hexapod_init(hexapod_tracker *t, const hexapod_pose *start, real max_shift,
     t->max_shift = max_shift > 0 ? max_shift : R(0.02) * SIZE;
     t->max_turn = max_turn > 0 ? max_turn : R(0.1);
     t->confirm = confirm > 0 ? confirm : 3;
+    t->trusted = 1;
     t->status = HEXAPOD_CONVERGED;
     t->event = HEXAPOD_FOUND;
 }
@@ -760,7 +813,8 @@ void hexapod_init(hexapod_tracker *t, const hexapod_pose *start, real max_shift,
 const char *hexapod_status_label(hexapod_status status)
 {
     static const char *const labels[] = {@status_labels@};
-    return (unsigned)status < sizeof labels / sizeof *labels ? labels[status] : "unknown";
+    const unsigned count = sizeof labels / sizeof *labels;
+    return (unsigned)status < count && labels[status] ? labels[status] : "unknown";
 }
 
 const char *hexapod_event_label(hexapod_event event)

@@ -18,7 +18,7 @@ typedef @real@ hexapod_real;
 /* No call takes more Newton and descent steps than this. */
 #define HEXAPOD_MAX_STEPS @max_steps@
 
-/* The numbers of gough.Status. A pose is good for use up to NEAR_SINGULARITY. */
+/* The numbers of gough.Status. A pose is good for use up to OUTSIDE_WORKSPACE. */
 typedef enum {
 @status@
 } hexapod_status;
@@ -62,7 +62,7 @@ typedef struct {
     hexapod_real at[7], side;
     hexapod_pose candidate;
     hexapod_real max_shift, max_turn;
-    int confirm, lost, missed, agreeing, has_candidate, next_start;
+    int confirm, lost, trusted, missed, agreeing, has_candidate, next_start;
 } hexapod_tracker;
 
 /* Prepare a tracker.

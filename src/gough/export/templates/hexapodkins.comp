@@ -13,7 +13,7 @@ Needs [TRAJ]LINEAR_UNITS = @unit@, [KINS]KINEMATICS = hexapodkins and JOINTS = 6
 pin out unsigned last_iterations "Steps of the last forward kinematics";
 pin out unsigned max_iterations "Most steps that a call took so far; never above @max_steps@";
 pin out float residual "Largest strut error of the last pose that was tried [@unit@]";
-pin out unsigned status "Number of gough.Status of the last call; 0 to 2: the pose is good";
+pin out unsigned status "Number of gough.Status of the last call; 0 to 3: the pose is good";
 pin out bit fwd_kins_fail "The last call found no pose that may be used: the pose was left as it was";
 pin in float tool_offset "Tool length, as motion.tooloffset.z gives it [@unit@]";
 pin in float spindle_offset "Added to the z of all joints, as genhexkins has it [@unit@]";
