@@ -58,9 +58,9 @@ def reached_from(platform: Platform, start: Pose, pose: Pose) -> NDArray[np.bool
     first, last = (joint_positions(platform, p).mean(axis=-2) for p in (start, pose))
     along = np.sum(start.wxyz * pose.wxyz, axis=-1)
     wxyz = np.where(along < 0, -1.0, 1.0)[:, None] * pose.wxyz
-    length = np.linalg.norm(last - first, axis=-1) / (TRANSLATION_STEP * platform.size)
-    turn = 2 * np.linalg.norm(wxyz - start.wxyz, axis=-1) / ROTATION_STEP  # chords of quaternions
-    count = np.ceil(np.clip(np.maximum(length, turn), 1, MOST_POINTS))
+    shift = np.linalg.norm(last - first, axis=-1) / (TRANSLATION_STEP * platform.size)
+    turn = 2 * np.linalg.norm(wxyz - start.wxyz, axis=-1) / ROTATION_STEP  # a chord, for the angle
+    count = np.minimum(np.floor(np.sqrt(1 + shift**2 + turn**2)), MOST_POINTS)
     good = np.isfinite(count)
     for n in range(1, MOST_POINTS + 1):
         rows = np.flatnonzero(good & (count >= n))

@@ -57,7 +57,7 @@ def places_of(platform: Platform, prefix: str, kind: Precision) -> dict[str, str
         "starts": str(START_COUNT),
         "status": _members(STATUSES, prefix),
         "event": _members(tuple(Event), prefix),
-        "status_labels": ", ".join(f'[{int(s)}] = "{s.label}"' for s in STATUSES),
+        "status_labels": ", ".join(f'"{status.label}"' for status in Status),
         "event_labels": ", ".join(f'"{event.label}"' for event in Event),
         "constants": constant_lines(platform, kind),
     }

@@ -5,7 +5,7 @@ Repeats `gough.home_mode.reached_from`.
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from math import sqrt
 
 from gough.home_mode import MOST_POINTS, ROTATION_STEP, SAME_TIP, TRANSLATION_STEP
 from gough.kernel.equations import rotation, turned
@@ -35,18 +35,17 @@ def reached_from(constants, buffer, start, work):
     """
     position, quaternion, right, unknowns = work[1, 0], work[1, 1], work[3, 0], work[3, 1]
     first, turned_by = start
-    shift, turn, along = 0.0, 0.0, 0.0
+    square, along = 1.0, 0.0
     for i in range(4):
         along += buffer[QUATERNION + i] * turned_by[i]
     side = -1.0 if along < 0 else 1.0  # of the two quaternions of the pose the nearer one
     for i in range(3):
-        step = buffer[i] - first[i]
-        shift += step * step
+        step = (buffer[i] - first[i]) / TRANSLATION_STEP
+        square += step * step
     for i in range(4):
-        step = side * buffer[QUATERNION + i] - turned_by[i]
-        turn += 4 * step * step
-    steps = max(sqrt(shift) / TRANSLATION_STEP, sqrt(turn) / ROTATION_STEP, 1.0)
-    count = ceil(steps) if steps < MOST_POINTS else MOST_POINTS
+        step = 2 * (side * buffer[QUATERNION + i] - turned_by[i]) / ROTATION_STEP
+        square += step * step
+    count = int(sqrt(square)) if square < MOST_POINTS * MOST_POINTS else MOST_POINTS
     for n in range(1, count + 1):
         t = n / count
         for i in range(3):

@@ -537,30 +537,31 @@ static int reach(problem *w, real legs[6], real rates[6])
 static int reached_from(const problem *end, const real from[7])
 {
     problem w;
-    real step[7], legs[6], rates[6], J[36], r[6], A[36], x[6], shift, turn, steps;
-    const real along = from[3] * end->q[0] + from[4] * end->q[1] + from[5] * end->q[2] +
-                       from[6] * end->q[3];
+    real at[7], step[7], J[36], r[6], x[6], along = 0, square = 1;
     int count;
-    for (int k = 0; k < 3; k++) step[k] = end->s[k] - from[k];
-    for (int k = 3; k < 7; k++) step[k] = (along < 0 ? -end->q[k - 3] : end->q[k - 3]) - from[k];
-    shift = SQRT(dot(step, step)) / SHIFT_STEP;
-    turn = 2 * SQRT(dot(step + 3, step + 3) + step[6] * step[6]) / TURN_STEP;
-    steps = shift > turn ? shift : turn;
-    count = steps < MOST_POINTS ? 1 + (int)steps : MOST_POINTS;
-    for (int n = 1; n <= count; n++) {
-        real at[7];
-        for (int k = 0; k < 7; k++) at[k] = from[k] + step[k] * (real)n / (real)count;
-        memcpy(w.s, at, sizeof w.s);
-        put_quaternion(&w, at[3], at[4], at[5], at[6]);
-        if (reach(&w, legs, rates)) return 0;
-        (void)strut_errors(&w, J, r);
-        if (!(solve_plain(J, r, A, x) * HOME_SIGN >= 0)) return 0;
+    get_internal(end, step);
+    for (int k = 3; k < 7; k++) along += from[k] * step[k];
+    for (int k = 0; k < 7; k++) {
+        step[k] = (k > 2 && along < 0 ? -step[k] : step[k]) - from[k];
+        at[k] = step[k] / (k > 2 ? R(0.5) * TURN_STEP : SHIFT_STEP);
+        square += at[k] * at[k];
     }
+    count = square < MOST_POINTS * MOST_POINTS ? (int)SQRT(square) : MOST_POINTS;
+    for (int n = 1; n <= count; n++) {
+        for (int k = 0; k < 7; k++) at[k] = from[k] + step[k] * (real)n / (real)count;
+        set_internal(&w, at);
+        put_quaternion(&w, at[3], at[4], at[5], at[6]);
+        if (reach(&w, r, x)) return 0;
+        (void)strut_errors(&w, J, r);
+        if (!(eliminate(J, r, x) * HOME_SIGN >= 0)) return 0;
+    }
+#if ROTARY
     for (int i = 0; i < 6; i++) { /* motors on another branch have other tips */
         for (int k = 0; k < 3; k++) {
             if (FABS(w.base[i][k] - end->base[i][k]) > SAME_TIP) return 0;
         }
     }
+#endif
     return 1;
 }
 
@@ -813,8 +814,7 @@ void hexapod_init(hexapod_tracker *t, const hexapod_pose *start, real max_shift,
 const char *hexapod_status_label(hexapod_status status)
 {
     static const char *const labels[] = {@status_labels@};
-    const unsigned count = sizeof labels / sizeof *labels;
-    return (unsigned)status < count && labels[status] ? labels[status] : "unknown";
+    return (unsigned)status < sizeof labels / sizeof *labels ? labels[status] : "unknown";
 }
 
 const char *hexapod_event_label(hexapod_event event)
