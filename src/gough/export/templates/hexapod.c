@@ -31,12 +31,12 @@ typedef struct {
     real determinant;  /* of the matrix with rows (d_i, a_i x d_i), at the last step's start */
     real step;         /* squared size of the last Newton step */
     real residual;     /* largest strut error */
-    int within;        /* in the workspace */
-    int inside;        /* and the determinant has the sign that it has at home */
+    int inside;        /* OUTSIDE or INSIDE the workspace, or MIRRORED: there with the other sign */
     int regular;       /* surely farther from a singularity than SINGULAR */
 } problem;
 
 enum { SOLVED, STATIONARY, UNFINISHED };
+enum { OUTSIDE, MIRRORED, INSIDE };
 
 static int is_finite(real x)
 {
@@ -250,8 +250,8 @@ static void assess(problem *w)
         const real shift = w->s[k] + arm[k] - HOME_SHIFT[k];
         within &= shift >= SHIFT_LOW[k] && shift <= SHIFT_HIGH[k];
     }
-    w->within = within & turned_within(rot);
-    w->inside = w->within && w->determinant * HOME_SIGN >= 0;
+    w->inside = w->determinant * HOME_SIGN >= 0 ? INSIDE : MIRRORED;
+    if (!(within & turned_within(rot))) w->inside = OUTSIDE;
 }
 
 /* Newton's method from where w is; whether it ends at a pose with these lengths.
@@ -532,13 +532,15 @@ static int reach(problem *w, real legs[6], real rates[6])
 
 /* ---- home's assembly mode (gough: home_mode.py) --------------------------------------------- */
 
-/* Whether the determinant has home's sign all along the straight way from an internal pose to that
- * in `end`, and the motors reach all of it. */
-static int reached_from(const problem *end, const real from[7])
+/* Whether the determinant has home's sign all along the straight way from an internal pose to
+ * that in `end`, and the motors reach all of it. */
+static int reached_from(const problem *end, const real s[3], const real q[4])
 {
     problem w;
-    real at[7], step[7], J[36], r[6], x[6], along = 0, square = 1;
+    real from[7], at[7], step[7], J[36], r[6], x[6], along = 0, square = 1;
     int count;
+    memcpy(from, s, 3 * sizeof *s);
+    memcpy(from + 3, q, 4 * sizeof *q);
     get_internal(end, step);
     for (int k = 3; k < 7; k++) along += from[k] * step[k];
     for (int k = 0; k < 7; k++) {
@@ -565,6 +567,14 @@ static int reached_from(const problem *end, const real from[7])
     return 1;
 }
 
+/* Whether a pose is the machine's, as far as home and a pose given by the user show. */
+static int is_ours(const problem *w, problem *scratch, const hexapod_pose *given)
+{
+    if (w->inside == INSIDE) return 1;
+    if (reached_from(w, STARTS[0], STARTS[0] + 3)) return 1;
+    return given && set_pose(scratch, given) && reached_from(w, scratch->s, scratch->q);
+}
+
 /* ---- solve (gough: fk/solve.py) ------------------------------------------------------------ */
 
 /* `ours`: the pose is in the machine's assembly mode, as far as is known. */
@@ -575,7 +585,7 @@ static hexapod_status judge(const problem *w, int outcome, int ours, const real 
     if (!ours) return HEXAPOD_OTHER_MODE;
     if (!w->regular && near_singularity(w)) return HEXAPOD_NEAR_SINGULARITY;
     if (!in_stroke(legs)) return HEXAPOD_OUTSIDE_STROKE;
-    return STATED && !w->within ? HEXAPOD_OUTSIDE_WORKSPACE : HEXAPOD_CONVERGED;
+    return STATED && w->inside == OUTSIDE ? HEXAPOD_OUTSIDE_WORKSPACE : HEXAPOD_CONVERGED;
 }
 
 static int has_pose(hexapod_status status)
@@ -592,23 +602,20 @@ hexapod_status hexapod_solve(const real legs[6], hexapod_pose *inout, hexapod_in
     if (take_reading(&w, legs)) {
         problem newton;
         real side = 0;
-        real from[7];
-        int followed, stays, ours, outcome = SOLVED;
+        int followed, stays, outcome = SOLVED;
         if (!set_pose(&w, inout)) set_internal(&w, STARTS[0]);
-        get_internal(&w, from);
         newton = w;
         followed = follow(&newton, &steps, &side);
-        stays = followed && (newton.inside || !(side * HOME_SIGN > 0));
+        stays = followed && (newton.inside == INSIDE || !(side * HOME_SIGN > 0));
         if (!stays) { /* Newton's method may have crossed a singularity: damped, it rarely does */
             if (!(side * HOME_SIGN > 0)) set_internal(&w, STARTS[0]);
             outcome = descend(&w, &steps);
         }
-        if (stays || (followed && !(outcome == SOLVED && w.inside))) {
+        if (stays || (followed && !(outcome == SOLVED && w.inside == INSIDE))) {
             w = newton;
             outcome = SOLVED;
         }
-        ours = w.inside || reached_from(&w, STARTS[0]) || reached_from(&w, from);
-        status = judge(&w, outcome, ours, legs);
+        status = judge(&w, outcome, is_ours(&w, &newton, inout), legs);
         if (has_pose(status)) get_pose(&w, inout);
     }
     if (info) {
@@ -701,13 +708,12 @@ static int far_apart(const hexapod_pose *a, const hexapod_pose *b, real shift, r
 /* Look for the pose of a reading that cannot be followed, from one start. */
 static hexapod_status search(hexapod_tracker *t, problem *w, const real legs[6])
 {
-    int outcome, ours;
+    int outcome;
     if (t->next_start < START_COUNT) set_internal(w, STARTS[t->next_start]);
     else (void)set_pose(w, &t->candidate);
     outcome = descend(w, &t->info.steps);
     t->info.residual = w->residual * SIZE;
-    ours = outcome == SOLVED && (w->inside || reached_from(w, STARTS[0]));
-    return judge(w, outcome, ours, legs);
+    return judge(w, outcome, is_ours(w, NULL, NULL), legs);
 }
 
 /* Whether enough readings agree on the pose in w, far from the present one. */
@@ -720,7 +726,7 @@ static int confirmed(hexapod_tracker *t, const problem *w)
     if (t->has_candidate) {
         agrees = !far_apart(&t->candidate, &found, t->max_shift, t->max_turn);
     }
-    if (!(STATED ? w->inside : usable) && t->next_start < START_COUNT) { /* try all starts first */
+    if (!(STATED ? w->inside == INSIDE : usable) && t->next_start < START_COUNT) { /* try all starts first */
         if (!t->has_candidate) t->candidate = found;
         t->has_candidate = 1;
         t->agreeing = 0;
@@ -749,7 +755,7 @@ static int followed(hexapod_tracker *t, problem *w, int cycles, int *crossed, in
         !far_apart(&t->pose, &pose, t->max_shift * (real)cycles, t->max_turn * (real)cycles)) {
         return 1;
     }
-    *found = *found && w->inside;
+    *found = *found && w->inside == INSIDE;
     return 0;
 }
 
@@ -767,7 +773,7 @@ hexapod_event hexapod_update(hexapod_tracker *t, const real legs[6])
         return t->event;
     }
     if (!t->lost && followed(t, &w, cycles, &crossed, &found)) {
-        if (w.inside) t->trusted = 1;
+        if (w.inside == INSIDE) t->trusted = 1;
         t->status = judge(&w, SOLVED, t->trusted, legs);
         t->event = HEXAPOD_FOLLOWED;
     } else {
