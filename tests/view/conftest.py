@@ -10,19 +10,15 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import chromium
 import pytest
-from playwright.sync_api import (
-    Browser,
-    BrowserContext,
-    ConsoleMessage,
-    Locator,
-    Page,
-)
 
 from gough import Platform
 from gough.view.viewer import Viewer
+
+if TYPE_CHECKING:  # a second, which tests without the browser need not wait
+    from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Locator, Page
 
 ARTEFACTS = Path(os.environ.get("GOUGH_ARTEFACTS", Path(__file__).parents[2] / "runs" / "view"))
 PATIENCE = 120_000  # [ms] a busy machine may compile and draw in software
@@ -31,6 +27,8 @@ WINDOW = {"width": 1360, "height": 900}
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
+    import chromium
+
     found = chromium.find()
     if found is None:
         pytest.skip(chromium.MISSING)
