@@ -16,7 +16,7 @@ import gough
 from gough import GoughError, Platform, PlatformError, Pose
 from gough.checks import LARGEST
 from gough.modes.choose import BRANCH_SLACK
-from gough.platform import COINCIDENT
+from gough.platform_checks import COINCIDENT
 from gough.pose import ROTATION, UNIT_LENGTH
 from gough.rotary import RIGHT_ANGLE
 

@@ -9,22 +9,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough import limit_rules, struts
-from gough.checks import Array, frozen, one_or_six, platform_field, platform_numbers
+from gough import limit_rules, platform_checks, struts
+from gough.checks import Array, frozen, one_or_six, platform_field
 from gough.errors import PlatformError
 from gough.frames import FramePose, Frames, frame_pose
+from gough.platform_checks import LegKind
 from gough.pose import Pose
 from gough.rotary import RotaryArms
 from gough.text import page, vector
 from gough.workspace import Workspace
-
-LegKind = Literal["telescopic", "length_change", "rotary"]
-COINCIDENT = 1e-9  # joints closer than this share of the platform's size are one point
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -100,11 +97,11 @@ class Platform:
         for field, text in (("unit", unit), ("name", name)):
             if not isinstance(text, str):
                 raise PlatformError(f"{field}: expected text, found {text!r}")
-        _check_parts(legs, workspace, rotary, frames)
+        platform_checks.check_parts(legs, workspace, rotary, frames)
         fields = {
-            "base": _joints("base", base),
-            "moving": _joints("moving", moving),
-            "home": _home(home),
+            "base": platform_checks.joints("base", base),
+            "moving": platform_checks.joints("moving", moving),
+            "home": platform_checks.home_pose(home),
             "unit": unit,
             "name": name,
             "legs": legs,
@@ -112,13 +109,15 @@ class Platform:
             "workspace": workspace,
             "rotary": rotary,
             "offset": one_or_six("offset", offset),
-            "gain": _nonzero("gain", one_or_six("gain", gain)),
+            "gain": platform_checks.nonzero("gain", one_or_six("gain", gain)),
             "frames": frames,
         }
         for field, value in fields.items():
             object.__setattr__(self, field, value)
-        self._check_joints()
-        object.__setattr__(self, "stroke", self._checked_stroke(stroke))
+        at_home = self._moving_at_home()
+        platform_checks.check_joints(self.base, self.moving, at_home, self.size, rotary is None)
+        limits = platform_checks.stroke_limits(stroke, legs, self.home_legs)
+        object.__setattr__(self, "stroke", limits)
 
     # ---- files ------------------------------------------------------------------------
 
@@ -269,7 +268,12 @@ class Platform:
         Raises:
             PlatformError: the platform states no workspace.
         """
-        return self._workspace().sample(self.home, count, seed)
+        if self.workspace is None:
+            raise PlatformError(
+                f"workspace: platform {self.name!r} states none; add a [workspace] table or call "
+                "with_workspace(translation, rotation_deg)"
+            )
+        return self.workspace.sample(self.home, count, seed)
 
     def in_workspace(self, pose: Pose) -> NDArray[np.bool_]:
         """Whether poses (...) are in the workspace; True where none is stated.
@@ -279,83 +283,12 @@ class Platform:
         """
         return limit_rules.in_workspace(self, pose)
 
-    def _workspace(self) -> Workspace:
-        if self.workspace is None:
-            raise PlatformError(
-                f"workspace: platform {self.name!r} states none; add a [workspace] table or call "
-                "with_workspace(translation, rotation_deg)"
-            )
-        return self.workspace
-
-    # ---- checks -----------------------------------------------------------------------
-
     def _moving_at_home(self) -> Array:
         home = self.home
         return struts.joints(self.moving, self.pivot_point, home.position, home.rotation)
 
     def _home_struts(self) -> Array:
         return self._moving_at_home() - self.base
-
-    def _check_joints(self) -> None:
-        at_home = self._moving_at_home()
-        for i, j in combinations(range(6), 2):
-            gaps = [np.linalg.norm(p[i] - p[j]) for p in (self.base, self.moving)]
-            if max(gaps) <= COINCIDENT * self.size:
-                raise PlatformError(
-                    f"base[{i}], base[{j}] and moving[{i}], moving[{j}]: legs {i + 1} and {j + 1} "
-                    "share both joints, so they are one leg; expected six different legs"
-                )
-        for name, points in (("base", self.base), ("moving", self.moving)):
-            spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-            if spread[1] <= COINCIDENT * self.size:
-                raise PlatformError(
-                    f"{name}: all six joints lie on one line, about which the platform would turn "
-                    "freely; expected joints that span a plane"
-                )
-        if self.legs != "rotary":
-            for i in range(6):
-                if np.linalg.norm(at_home[i] - self.base[i]) <= COINCIDENT * self.size:
-                    raise PlatformError(
-                        f"home: leg {i + 1} has length 0 there: base[{i}] and moving[{i}] are at "
-                        f"the same point {self.base[i].tolist()}"
-                    )
-
-        if not np.all(np.isfinite(self.home_legs)):
-            leg = int(np.argmin(np.isfinite(self.home_legs)))
-            raise PlatformError(
-                f"home: the arm and rod of leg {leg + 1} cannot reach the home pose; check home, "
-                "rotary.arm_length and rotary.rod_length"
-            )
-
-    def _checked_stroke(self, stroke: ArrayLike | None) -> Array | None:
-        """Stroke as (6, 2), each lowest below highest and home between them."""
-        if stroke is None:
-            return None
-        limits = platform_numbers("stroke", stroke)
-        if limits.shape not in ((2,), (6, 2)):
-            raise PlatformError(
-                f"stroke: expected [lowest, highest] or six such pairs, got shape {limits.shape}"
-            )
-        turns = np.isfinite(limits) & (np.abs(limits) > 2 * np.pi)
-        if self.legs == "rotary" and np.any(turns):
-            found = limits[turns].flat[0]
-            raise PlatformError(
-                f"stroke: motor angles are in rad, and {found:g} is more than a turn; if it is "
-                f"degrees, write {np.radians(found):.6g}"
-            )
-        readings = "motor angles" if self.legs == "rotary" else "leg readings"
-        limits = frozen(np.broadcast_to(limits, (6, 2)) + 0.0)
-        for i, ((low, high), home) in enumerate(zip(limits, self.home_legs, strict=True)):
-            if not low < high:
-                raise PlatformError(
-                    f"stroke[{i}]: expected lowest below highest, found [{low}, {high}]"
-                )
-            if not low <= home <= high:
-                raise PlatformError(
-                    f"stroke[{i}]: forbids the home pose: {readings} at home are {home:.6g}, "
-                    f"allowed are {low:.6g} to {high:.6g}; change home or stroke"
-                )
-        return limits
 
     # ---- identity ---------------------------------------------------------------------
 
@@ -397,27 +330,6 @@ class Platform:
         return notes
 
 
-def _check_parts(legs: str, workspace: object, rotary: object, frames: object) -> None:
-    """Raise unless the kind of leg is known and the parts are what it needs."""
-    if legs not in get_args(LegKind):
-        kinds = ", ".join(get_args(LegKind))
-        raise PlatformError(f"legs: expected one of {kinds}; found {legs!r}")
-    parts = (("rotary", RotaryArms, rotary), ("workspace", Workspace, workspace))
-    for name, kind, part in (*parts, ("frames", Frames, frames)):
-        if part is not None and not isinstance(part, kind):
-            raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
-    if (legs == "rotary") != (rotary is not None):
-        need = "needs" if legs == "rotary" else "must not have"
-        raise PlatformError(f"rotary: a platform with {legs} legs {need} this table")
-
-
-def _nonzero(name: str, value: Array) -> Array:
-    if np.any(value == 0):
-        leg = int(np.argmin(np.abs(value)))
-        raise PlatformError(f"{name}[{leg}]: expected a number other than 0, found 0.0")
-    return value
-
-
 def _pose_dict(pose: Pose) -> dict[str, list]:
     return {"position": pose.position.tolist(), "wxyz": pose.wxyz.tolist()}
 
@@ -427,20 +339,3 @@ def _plain(key: str, value: Array) -> list | float:
     if key in ("arm_length", "rod_length") and np.all(value == value[0]):
         return float(value[0])
     return value.tolist()
-
-
-def _joints(name: str, value: ArrayLike) -> Array:
-    array = platform_numbers(name, value)
-    if array.ndim == 2 and array.shape[1] == 3 and len(array) != 6:
-        raise PlatformError(f"{name}: expected 6 joints, one for each leg, found {len(array)}")
-    return platform_field(name, value, (6, 3))
-
-
-def _home(value: Pose | ArrayLike) -> Pose:
-    pose = value if isinstance(value, Pose) else Pose(platform_field("home", value, (3,)))
-    if pose.batch:
-        raise PlatformError(f"home: expected one pose, found batch axes {pose.batch}")
-    return Pose(
-        platform_field("home.position", pose.position, (3,)),
-        platform_field("home.wxyz", pose.wxyz, (4,)),
-    )

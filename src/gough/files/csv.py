@@ -232,28 +232,26 @@ class CsvSink:
             csv.writer(text, lineterminator="\n").writerow(table.column_names)
             self._file.write(text.getvalue().encode())
             self._begun = True
-        self._file.write(_csv_rows(table))
-
-
-def _csv_rows(table: pa.Table) -> bytes:
-    columns = [
-        c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c for c in table.columns
-    ]
-    table = pa.table(columns, names=table.column_names)
-    # pyarrow's "needed" quotes all text; try without, which it refuses where quotes are needed
-    problem = ""
-    for style in ("none", "needed"):
-        buffer = pa.BufferOutputStream()
-        options = pacsv.WriteOptions(include_header=False, quoting_style=style)
-        try:
-            pacsv.write_csv(table, buffer, options)
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
-            problem = str(error)
-        else:
-            return buffer.getvalue().to_pybytes()
-    nested = [f"column {f.name} ({f.type})" for f in table.schema if pa.types.is_nested(f.type)]
-    what = " and ".join(nested) or problem.splitlines()[0]
-    raise GoughError(f"{what} cannot be written as CSV; leave it out or write .parquet")
+        columns = [
+            c.cast(c.type.value_type) if pa.types.is_dictionary(c.type) else c
+            for c in table.columns
+        ]
+        table = pa.table(columns, names=table.column_names)
+        # pyarrow's "needed" quotes all text; try without, which it refuses where quotes are needed
+        problem = ""
+        for style in ("none", "needed"):
+            rows = pa.BufferOutputStream()
+            options = pacsv.WriteOptions(include_header=False, quoting_style=style)
+            try:
+                pacsv.write_csv(table, rows, options)
+            except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
+                problem = str(error)
+            else:
+                self._file.write(rows.getvalue())
+                return
+        nested = [f"column {f.name} ({f.type})" for f in table.schema if pa.types.is_nested(f.type)]
+        what = " and ".join(nested) or problem.splitlines()[0]
+        raise GoughError(f"{what} cannot be written as CSV; leave it out or write .parquet")
 
 
 # ---- fields ---------------------------------------------------------------------------
