@@ -24,7 +24,7 @@ import numpy as np
 import gough
 from gough.seeds.damped import polish
 from gough.seeds.network import NetworkSeed
-from gough.seeds.taylor import HomeStruts, TaylorSeed, gibbs_quaternion, series
+from gough.seeds.taylor import HomeStruts, TaylorSeed, series
 from gough.seeds.universal import UniversalSeed
 
 POSES, NEWTON_POSES = 20_000, 100_000
@@ -87,8 +87,7 @@ class Closed:
         with np.errstate(all="ignore"):
             home = HomeStruts.of(self.platform, legs)
             terms = series(home.base, home.joints, home.inverse, home.change, self.order)
-            x = np.swapaxes(home.inverse @ sum(terms), 0, 1)
-            found = polish(home, x[:3], gibbs_quaternion(x[3:]))
+            found = polish(home, home.twist(np.sum(terms, axis=0)))
         return home.pose(self.platform, found.t, found.wxyz)
 
 

@@ -14,8 +14,8 @@ from machines import permuted, random_platform
 import gough
 from gough.seeds.base import find_seed
 from gough.seeds.network import seal
-from gough.seeds.taylor import HomeStruts
-from gough.seeds.universal import UniversalSeed
+from gough.seeds.taylor import HomeStruts, series
+from gough.seeds.universal import ORDER, UniversalSeed
 from gough.units import scaled
 
 few = support.at_most(12)
@@ -26,7 +26,8 @@ kinds = st.sampled_from(["telescopic", "length_change", "rotary"])
 def changes(platform: gough.Platform, legs: np.ndarray) -> np.ndarray:
     """The network's answer before any Newton step: strut length changes by leg, (6, N)."""
     home = HomeStruts.of(platform, legs)
-    found = UniversalSeed(platform)._corrected(home)
+    terms = np.stack(series(home.base, home.joints, home.inverse, home.change, ORDER))
+    found = UniversalSeed(platform)._corrected(home, terms)
     return np.moveaxis(found, 1, 0).reshape(6, -1)
 
 
@@ -161,6 +162,36 @@ def test_errors_and_their_prediction(name, box):
     assert np.mean(turned < 3 * guess.rotation_error) >= 0.99
     # and not by being afraid of everything
     assert np.median(guess.position_error / away) < 3
+
+
+def test_poses_beyond_a_singularity_are_exchanged_for_their_twins():
+    """Far from what it was trained on the network's own answer can be in another assembly mode."""
+    platform = gough.Platform.load("rubin_camera")
+    platform = platform.with_workspace(0.08 * platform.size, 15)
+    pose = platform.sample_poses(2000, seed=1)
+    pose = pose[gough.assembly_sign(platform, pose) > 0]
+    legs = gough.leg_lengths(platform, pose)
+    alone = UniversalSeed(platform, polished=False).guess(legs)
+    assert np.sum(gough.assembly_sign(platform, alone) < 0) > 5
+    guess = UniversalSeed(platform).guess(legs)
+    assert np.all(gough.assembly_sign(platform, guess) > 0)
+    assert np.max(guess.distance(pose)[0]) < 0.01 * platform.size
+
+
+def test_motors_cost_little_more():
+    """Rotary legs: one reading of the machine for all rows, and its own for those that need it."""
+    platform = gough.Platform.load("reachy_mini")
+    platform = platform.with_workspace(0.08 * platform.size, 30)
+    pose = platform.sample_poses(400, seed=2)
+    legs = gough.leg_lengths(platform, pose)
+    good = np.isfinite(legs).all(-1) & (gough.assembly_sign(platform, pose) > 0)
+    seed, read = UniversalSeed(platform), []
+    run = seed._run
+    seed._run = lambda struts, terms: (read.append(len(struts.base)), run(struts, terms))[1]
+    away = seed.guess(legs[good]).distance(pose[good])[0]
+    assert read[0] == 1
+    assert 0 < read[1] < 0.4 * len(away)
+    assert away.mean() < 5e-6 * platform.size
 
 
 def test_any_readings_give_a_finite_pose_and_say_how_far_it_may_be():

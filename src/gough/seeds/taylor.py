@@ -16,7 +16,7 @@ J x_1 = d and J x_k = -(what x_1 to x_(k-1) contribute at order k).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +96,7 @@ class HomeStruts:
         inverse: inverse of the Jacobian, rows (n_i, r_i x n_i), (M, 6, 6).
         change: strut lengths minus those at home, (M, 6, N).
         lengths: strut lengths, (M, 6, N).
+        side: sign of det J at the platform's home.
     """
 
     base: Array
@@ -103,6 +104,7 @@ class HomeStruts:
     inverse: Array
     change: Array
     lengths: Array
+    side: float
 
     @classmethod
     def of(cls, platform: Platform, legs: Array) -> HomeStruts:
@@ -112,22 +114,26 @@ class HomeStruts:
             GoughError: home is singular.
         """
         lower, lengths = equivalent_struts(platform, legs)
-        joints, centre = _joints_at_home(platform)
         many = platform.rotary is not None
-        base = ((lower if many else lower[:1]) - centre) / platform.size
-        joints = np.broadcast_to(joints / platform.size, base.shape)
+        base, joints = _ends_at_home(platform, lower if many else lower[:1])
         home = np.linalg.norm(joints - base, axis=-1)
         lengths = lengths / platform.size
         lengths = lengths[..., None] if many else lengths.T[None]
-        rows = jacobian(by_component(joints - base), by_component(joints))[:, 0]
-        return cls(base, joints, _inverses(platform, rows), lengths - home[..., None], lengths)
+        inverse = _inverses(platform, _home_jacobian(base, joints))
+        change = lengths - home[..., None]
+        return cls(base, joints, inverse, change, lengths, _home_side(platform))
 
     def pick(self, chosen: NDArray[np.bool_]) -> HomeStruts:
         """The chosen (M, N) of the readings."""
         if len(self.base) == 1:
             rows = chosen[0]
             return replace(self, change=self.change[..., rows], lengths=self.lengths[..., rows])
-        return HomeStruts(*(getattr(self, f.name)[chosen[:, 0]] for f in fields(self)))
+        names = ("base", "joints", "inverse", "change", "lengths")
+        return replace(self, **{name: getattr(self, name)[chosen[:, 0]] for name in names})
+
+    def twist(self, changes: Array) -> Array:
+        """Twists (6, M, N) that change the strut lengths by (M, 6, N), to first order."""
+        return np.swapaxes(self.inverse @ changes, 0, 1)
 
     def pose(self, platform: Platform, t: Array, wxyz: Array) -> Pose:
         """Poses (N,) after translations (3, M, N) and rotations (4, M, N) from home."""
@@ -169,7 +175,7 @@ class TaylorSeed:
     def _guess(self, legs: Array) -> Pose:
         struts = HomeStruts.of(self.platform, legs)
         terms = series(struts.base, struts.joints, struts.inverse, struts.change, self.order)
-        x = np.swapaxes(struts.inverse @ sum(terms), 0, 1)
+        x = struts.twist(np.sum(terms, axis=0))
         return struts.pose(self.platform, x[:3], gibbs_quaternion(x[3:]))
 
 
@@ -203,6 +209,25 @@ def gibbs_quaternion(w: Array) -> Array:
     """Unit quaternions (4, ...) of rotations whose Gibbs vectors are w / 2, (3, ...)."""
     wxyz = np.concatenate([np.ones_like(w[:1]), w / 2])
     return wxyz / np.sqrt(np.sum(wxyz * wxyz, axis=0))
+
+
+def _ends_at_home(platform: Platform, lower: Array) -> tuple[Array, Array]:
+    """Lower ends (M, 6, 3) and platform joints at home, from their centre, in sizes."""
+    joints, centre = _joints_at_home(platform)
+    base = (lower - centre) / platform.size
+    return base, np.broadcast_to(joints / platform.size, base.shape)
+
+
+def _home_jacobian(base: Array, joints: Array) -> Array:
+    """Rows (n_i, r_i x n_i) at home, (M, 6, 6)."""
+    return jacobian(by_component(joints - base), by_component(joints))[:, 0]
+
+
+def _home_side(platform: Platform) -> float:
+    """Sign of det J at home."""
+    lower, _ = equivalent_struts(platform, platform.home_legs[None])
+    rows = _home_jacobian(*_ends_at_home(platform, lower))
+    return float(np.linalg.slogdet(rows)[0][0])
 
 
 def _joints_at_home(platform: Platform) -> tuple[Array, Array]:
