@@ -4,6 +4,13 @@ They polish a guess that a network or a series made. A step solves (J^T J + mu I
 strut errors e, with mu their mean square (Levenberg-Marquardt; Fan and Yuan, Computing 74, 2005):
 next to nothing where Newton's method converges, which leaves it quadratic, and short steps near
 singularities. The next step, with the same matrix, is not taken: it predicts the error.
+
+Steps can end beyond a singularity, where det J has not home's sign: at the twin of the pose that is
+looked for. Two poses with the same readings meet where J is singular, one on either side. Let sigma
+be the least singular value of J, u and v its vectors, and c = u . d2 l / ds2 the curvature of the
+strut lengths along v. Moving by s v changes them along u by sigma s + c s^2 / 2, which is nothing
+at s = 0 and at the other twin, s = -2 sigma / c. The steps go on from there. Where they end beyond
+the singularity again, the distance between the twins is the error predicted.
 """
 
 from __future__ import annotations
@@ -123,17 +130,7 @@ def _side(home: HomeStruts, found: Polished) -> Array:
 
 def _crossed(home: HomeStruts, found: Polished) -> Polished:
     """Poses on home's side of the singularity, from their twins beyond it."""
-    lever, strut, _ = _struts(home, found.t, found.wxyz)
-    u, sigma, v = np.linalg.svd(jacobian(strut, lever))
-    along = np.moveaxis(v[..., -1, :], -1, 0)  # (6, M, N)
-    w = along[3:, :, None]
-    turned = cross(w, lever)
-    speed, length = along[:3, :, None] + turned, np.sqrt(np.sum(strut * strut, axis=0))
-    n = strut / length
-    curvature = (np.sum(speed * speed, 0) - np.sum(n * speed, 0) ** 2) / length
-    curvature = curvature + np.sum(n * cross(w, turned), axis=0)  # (M, 6, N)
-    bend = np.sum(np.moveaxis(u[..., -1], -1, 1) * curvature, axis=1)
-    move = np.clip(-2 * sigma[..., -1] / bend, -WIDEST, WIDEST) * along
+    move = _to_twin(home, found)
     again = _steps(home, *_moved(found.t, found.wxyz, move))
     right = (_side(home, again) == home.side) & np.isfinite(again.step).all(0)
     unsure = np.where(np.abs(found.step) > np.abs(move), found.step, move)
@@ -141,6 +138,21 @@ def _crossed(home: HomeStruts, found: Polished) -> Polished:
         np.where(right, again.t, found.t), np.where(right, again.wxyz, found.wxyz),
         np.where(right, again.step, unsure),
     )  # fmt: skip
+
+
+def _to_twin(home: HomeStruts, found: Polished) -> Array:
+    """Twists (6, M, N) to the twins on the other side of the nearest singularity."""
+    lever, strut, _ = _struts(home, found.t, found.wxyz)
+    u, sigma, v = np.linalg.svd(jacobian(strut, lever))
+    along = np.moveaxis(v[..., -1, :], -1, 0)  # (6, M, N)
+    w = along[3:, :, None]
+    turned = cross(w, lever)
+    speed, length = along[:3, :, None] + turned, np.sqrt(np.sum(strut * strut, axis=0))
+    n = strut / length
+    bend = (np.sum(speed * speed, axis=0) - np.sum(n * speed, axis=0) ** 2) / length
+    bend = bend + np.sum(n * cross(w, turned), axis=0)  # d2 l / ds2, (M, 6, N)
+    curvature = np.sum(np.moveaxis(u[..., -1], -1, 1) * bend, axis=1)
+    return np.clip(-2 * sigma[..., -1] / curvature, -WIDEST, WIDEST) * along
 
 
 def _moved(t: Array, wxyz: Array, step: Array) -> tuple[Array, Array]:
