@@ -8,7 +8,18 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gough import Platform, Pose, RotaryArms, Workspace, singularity_distance
+from gough import (
+    MachineLimits,
+    Payload,
+    Platform,
+    Pose,
+    RotaryArms,
+    Workspace,
+    leg_gaps,
+    payload_forces,
+    singularity_distance,
+)
+from gough.limit_geometry import shared_joints
 
 Floats = NDArray[np.floating]
 
@@ -131,6 +142,36 @@ def griffis_duffy() -> Platform:
 def with_some_workspace(platform: Platform) -> Platform:
     """The platform itself, or with a small workspace if it states none."""
     return platform if platform.workspace else platform.with_workspace(0.02 * platform.size, 5)
+
+
+def limited(platform: Platform, seed: int | None = None) -> Platform:
+    """The platform with every limit of joints, legs and motors, home well within them.
+
+    Args:
+        seed: draw cones, axes, radii and forces that differ from leg to leg.
+    """
+    rng = np.random.default_rng(seed)
+    spread = np.ones(6) if seed is None else rng.uniform(0.8, 1.2, 6)
+    load = Payload(30.0, 0.1 * platform.size * np.array([0.1, 0.2, 1.0]))
+    forces = payload_forces(platform, platform.home, load)
+    most = 3 * np.max(np.abs(forces)) * spread
+    gaps = leg_gaps(platform, platform.home)[~shared_joints(platform)]
+    axes: dict = {}
+    if seed is not None:
+        axes = {
+            "base_joint_axis": rng.normal([0.0, 0.0, 1.0], 0.1, (6, 3)),
+            "moving_joint_axis": rng.normal([0.0, 0.0, 1.0], 0.1, (6, 3)),
+        }
+    return replace(platform, limits=MachineLimits(
+        base_joint_cone=(30.0 if not axes else 100.0) * spread,
+        moving_joint_cone=(40.0 if not axes else 100.0) * spread,
+        leg_radius=0.2 * gaps.min() * spread,
+        clearance=0.1 * gaps.min(),
+        leg_force=np.stack([-most, most], axis=-1),
+        payload=load,
+        leg_speed=platform.size * spread,
+        **axes,
+    ))  # fmt: skip
 
 
 # ---- the same platform seen otherwise -------------------------------------------------

@@ -63,6 +63,50 @@ def accelerations(
     return data.qacc.copy()
 
 
+def joint_angles(
+    platform: Platform, pose: Pose, angles: Floats | None = None, home: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Angles (6,) [rad] between each leg and its direction at home, at its two joints.
+
+    Directions are those between MuJoCo's sites, seen from the bodies that carry the sites; the
+    angle is that of the quaternion which MuJoCo finds to turn one into the other.
+
+    Args:
+        angles, home: of the motors, at the pose and at home.
+    """
+    model = mujoco.MjModel.from_xml_string(_mjcf(platform))
+    data = mujoco.MjData(model)
+    seen = []
+    for place, arms in ((platform.home, home), (pose, angles)):
+        motors = [] if arms is None else arms
+        data.qpos[:] = [*motors, *(place.position + platform.pivot_point), *place.wxyz]
+        mujoco.mj_kinematics(model, data)
+        seen.append(np.array([[_seen(model, data, a, b, i) for i in range(6)]
+                              for a, b in (("b", "p"), ("p", "b"))]))  # fmt: skip
+    return tuple(np.array([_turn(a, b) for a, b in zip(*side, strict=True)])
+                 for side in zip(*seen, strict=True))  # fmt: skip
+
+
+def _seen(model: mujoco.MjModel, data: mujoco.MjData, start: str, end: str, i: int) -> Floats:
+    """Unit vector from one site of leg i to the other, in the frame of the first one's body."""
+    site = model.site(f"{start}{i}").id
+    way = data.site_xpos[model.site(f"{end}{i}").id] - data.site_xpos[site]
+    seen = data.xmat[model.site_bodyid[site]].reshape(3, 3).T @ way
+    return seen / np.linalg.norm(seen)
+
+
+def _turn(a: Floats, b: Floats) -> float:
+    """Angle [rad] of the shortest rotation that takes a to b, by MuJoCo's quaternions."""
+    first, second, back = (np.zeros(4) for _ in range(3))
+    axis = np.zeros(3)
+    mujoco.mju_quatZ2Vec(first, a)
+    mujoco.mju_negQuat(back, first)
+    mujoco.mju_rotVecQuat(axis, b, back)
+    mujoco.mju_quatZ2Vec(second, axis)
+    mujoco.mju_quat2Vel(axis, second, 1.0)
+    return float(np.linalg.norm(axis))
+
+
 def _mjcf(platform: Platform) -> str:
     base, moving = platform.base, platform.moving - platform.pivot_point
     if platform.rotary is None:

@@ -21,6 +21,15 @@ from .kinematics import joint_positions as joint_positions
 from .kinematics import leg_lengths as leg_lengths
 from .kinematics import pose_covariance as pose_covariance
 from .kinematics import singularity_distance as singularity_distance
+from .limit_geometry import joint_angles as joint_angles
+from .limit_geometry import leg_gaps as leg_gaps
+from .limit_geometry import payload_forces as payload_forces
+from .machine_limits import MachineLimits as MachineLimits
+from .machine_limits import Payload as Payload
+from .margins import Limits as Limits
+from .margins import Reach as Reach
+from .margins import limits as limits
+from .margins import reach as reach
 from .modes.assembly import assembly_modes as assembly_modes
 from .modes.choose import Choice as Choice
 from .modes.choose import choose_mode as choose_mode

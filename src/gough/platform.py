@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough import limit_rules, platform_checks, struts
+from gough import limit_geometry, limit_rules, platform_checks, struts
 from gough.checks import Array, frozen, one_or_six, platform_field
 from gough.errors import PlatformError
 from gough.frames import FramePose, Frames, frame_pose
+from gough.machine_limits import MachineLimits
 from gough.platform_checks import LegKind
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -49,6 +50,7 @@ class Platform:
         workspace: the poses the machine is meant for.
         rotary: the motor arms, for rotary legs only.
         frames: named frames, such as a tool on the platform and a work piece beside the base.
+        limits: what joints, legs and motors allow; see `gough.limits`.
 
     Raises:
         PlatformError: naming the field, what was found and what was expected.
@@ -76,6 +78,7 @@ class Platform:
     offset: Array
     gain: Array
     frames: Frames | None
+    limits: MachineLimits | None
 
     def __init__(
         self,
@@ -93,11 +96,12 @@ class Platform:
         offset: ArrayLike = 0.0,
         gain: ArrayLike = 1.0,
         frames: Frames | None = None,
+        limits: MachineLimits | None = None,
     ) -> None:
         for field, text in (("unit", unit), ("name", name)):
             if not isinstance(text, str):
                 raise PlatformError(f"{field}: expected text, found {text!r}")
-        platform_checks.check_parts(legs, workspace, rotary, frames)
+        platform_checks.check_parts(legs, workspace, rotary, frames, limits)
         fields = {
             "base": platform_checks.joints("base", base),
             "moving": platform_checks.joints("moving", moving),
@@ -111,6 +115,7 @@ class Platform:
             "offset": one_or_six("offset", offset),
             "gain": platform_checks.nonzero("gain", one_or_six("gain", gain)),
             "frames": frames,
+            "limits": limits,
         }
         for field, value in fields.items():
             object.__setattr__(self, field, value)
@@ -118,6 +123,7 @@ class Platform:
         platform_checks.check_joints(self.base, self.moving, at_home, self.size, rotary is None)
         limits = platform_checks.stroke_limits(stroke, legs, self.home_legs)
         object.__setattr__(self, "stroke", limits)
+        limit_geometry.check_home(self)
 
     # ---- files ------------------------------------------------------------------------
 
@@ -184,9 +190,10 @@ class Platform:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over all that affects kinematics, seeds and statuses (not the name)."""
+        """SHA-256 over all that affects kinematics, seeds and statuses (not name and limits)."""
         facts = self.to_dict()
         facts.pop("name")
+        facts.pop("limits", None)
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
     def to_dict(self) -> dict:
@@ -206,6 +213,8 @@ class Platform:
                 out[key] = {k: _plain(k, v) for k, v in vars(part).items()}
         if self.frames is not None:
             out["frames"] = {name: _pose_dict(pose) for name, pose in self.frames.poses.items()}
+        if self.limits is not None:
+            out["limits"] = self.limits.to_dict()
         return out
 
     def with_workspace(self, translation: ArrayLike, rotation_deg: ArrayLike) -> Platform:
@@ -224,7 +233,8 @@ class Platform:
         if self.frames is not None:
             raise PlatformError("frames: state the point as a frame, such as tool_in_platform")
         home = Pose(self.home.apply(p), self.home.wxyz)
-        return replace(self, moving=self.moving - p, home=home)
+        limits = self.limits and self.limits.with_origin_at(p)
+        return replace(self, moving=self.moving - p, home=home, limits=limits)
 
     # ---- frames -----------------------------------------------------------------------
 
@@ -295,7 +305,11 @@ class Platform:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Platform):
             return NotImplemented
-        return self is other or (self.digest == other.digest and self.name == other.name)
+        return self is other or (self.digest == other.digest and self._label() == other._label())
+
+    def _label(self) -> tuple[str, dict | None]:
+        """What is not in the digest: the name, and the limits as plain lists."""
+        return self.name, self.limits and self.limits.to_dict()
 
     def __hash__(self) -> int:
         return hash(self.digest)

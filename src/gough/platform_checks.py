@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from gough.checks import Array, frozen, platform_field, platform_numbers
 from gough.errors import PlatformError
 from gough.frames import Frames
+from gough.machine_limits import MachineLimits
 from gough.pose import Pose
 from gough.rotary import RotaryArms
 from gough.workspace import Workspace
@@ -19,13 +20,16 @@ LegKind = Literal["telescopic", "length_change", "rotary"]
 COINCIDENT = 1e-9  # joints closer than this share of the platform's size are one point
 
 
-def check_parts(legs: str, workspace: object, rotary: object, frames: object) -> None:
+def check_parts(
+    legs: str, workspace: object, rotary: object, frames: object, limits: object
+) -> None:
     """Raise unless the kind of leg is known and the parts are what it needs."""
     if legs not in get_args(LegKind):
         kinds = ", ".join(get_args(LegKind))
         raise PlatformError(f"legs: expected one of {kinds}; found {legs!r}")
     parts = (("rotary", RotaryArms, rotary), ("workspace", Workspace, workspace))
-    for name, kind, part in (*parts, ("frames", Frames, frames)):
+    parts = (*parts, ("frames", Frames, frames), ("limits", MachineLimits, limits))
+    for name, kind, part in parts:
         if part is not None and not isinstance(part, kind):
             raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
     if (legs == "rotary") != (rotary is not None):

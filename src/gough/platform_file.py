@@ -16,6 +16,7 @@ from gough.checks import platform_field
 from gough.errors import GoughError, PlatformError, suggestion
 from gough.frames import Frames
 from gough.kinematics import home_sign, singularity_distance
+from gough.machine_limits import KEYS, MachineLimits, known_keys
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
@@ -25,12 +26,13 @@ from gough.workspace import Workspace
 log = logging.getLogger("gough")
 REQUIRED = ("base", "moving", "home")
 PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
-OPTIONAL = (*PLAIN, "workspace", "rotary", "frames", "readings")  # readings: see files.log_format
+OPTIONAL = (*PLAIN, "workspace", "rotary", "frames", "limits", "readings")  # see files.log_format
 POSE = ("position", "wxyz", "euler_deg", "order")
 TABLES = {
     "home": POSE,
     "workspace": ("translation", "rotation_deg"),
     "rotary": ("arm_length", "rod_length", "axis_x", "axis_y", "branch"),
+    "limits": KEYS,
 }
 
 
@@ -125,14 +127,14 @@ def _from_dict(facts: dict) -> Platform:
             near = get_close_matches(key, set(facts) - {*REQUIRED, *OPTIONAL}, n=1)
             misspelt = f" (is {near[0]!r} meant as {key}?)" if near else ""
             raise PlatformError(f"{key}: missing{misspelt}; expected {what}")
-    _known("", facts, REQUIRED + OPTIONAL)
+    known_keys("", facts, REQUIRED + OPTIONAL)
     for name, keys in TABLES.items():
         if name in facts:
             if not isinstance(facts[name], dict):
                 raise PlatformError(
                     f"{name}: expected a table with {', '.join(keys)}; found {facts[name]!r}"
                 )
-            _known(f"{name}.", facts[name], keys)
+            known_keys(f"{name}.", facts[name], keys)
     options = {k: facts[k] for k in PLAIN if k in facts}
     return Platform(
         facts["base"],
@@ -141,6 +143,7 @@ def _from_dict(facts: dict) -> Platform:
         workspace=_table(Workspace, "workspace", facts),
         rotary=_table(RotaryArms, "rotary", facts),
         frames=_frames(facts["frames"]) if "frames" in facts else None,
+        limits=MachineLimits(**facts["limits"]) if "limits" in facts else None,
         **options,
     )
 
@@ -164,7 +167,7 @@ def _frames(table: object) -> Frames:
                 f"frames.{key}: expected a pose such as {{position = [0, 0, 120], "
                 f"euler_deg = [0, 0, 90]}}, found {pose!r}"
             )
-        _known(f"frames.{key}.", pose, POSE)
+        known_keys(f"frames.{key}.", pose, POSE)
     return Frames({key: _pose(f"frames.{key}", pose) for key, pose in table.items()})
 
 
@@ -190,14 +193,6 @@ def _pose(where: str, table: dict) -> Pose:
         raise
     except GoughError as error:
         raise PlatformError(f"{where}.{error}") from None
-
-
-def _known(prefix: str, table: dict, keys: tuple[str, ...]) -> None:
-    for key in table:
-        if key not in keys:
-            raise PlatformError(
-                f"{prefix}{key}: unknown field{suggestion(key, keys)} fields are {', '.join(keys)}"
-            )
 
 
 def _value(value: object) -> str:

@@ -53,4 +53,5 @@ def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
         workspace=None if box is None else replace(box, translation=factor * box.translation),
         rotary=arms,
         frames=platform.frames and platform.frames.scaled(factor),
+        limits=platform.limits and platform.limits.scaled(factor, rotary=arms is not None),
     )
