@@ -127,7 +127,7 @@ def test_an_axis_and_its_opposite_are_one() -> None:
         )[0]
         for axes in (up, -3 * up)
     ]
-    np.testing.assert_array_equal(*angles)
+    np.testing.assert_array_equal(angles[0], angles[1])
 
 
 def test_a_moved_origin_moves_the_payload() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import coal
+import coal  # pyright: ignore[reportMissingImports] - a compiled module without types
 import machines
 import mujoco_model
 import numpy as np
@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import gough
 from gough import MachineLimits, Payload, Platform, Pose, Workspace, kinematics
+from gough.kernel.constants import solving_order
 from gough.limit_geometry import PAIRS, least_gaps, leg_bodies, segment_distance
 from gough.units import scaled
 
@@ -193,6 +194,21 @@ def test_payload_forces_hold_the_payload_in_mujoco(name: str) -> None:
         rest = mujoco_model.accelerations(platform, poses[i], wrench, forces, motors)
         moved = mujoco_model.accelerations(platform, poses[i], wrench, 0 * forces, motors)
         assert np.abs(rest).max() < 1e-9 * np.abs(moved).max()
+
+
+@pytest.mark.parametrize("pivot", [0.0, 1e-15, 1e-9])
+def test_forces_keep_their_digits_where_a_pivot_vanishes(pivot: float) -> None:
+    """The leg that is eliminated first has no component along x."""
+    platform = machines.limited(Platform.load("reference"))
+    leg = int(solving_order(platform)[0])
+    x = kinematics.strut_vectors(platform, platform.home)[leg, 0]
+    pose = Pose(platform.home.position + np.array([pivot * platform.size - x, 0, 0]))
+    limits = platform.limits
+    assert limits is not None
+    assert limits.leg_force is not None
+    forces = gough.payload_forces(platform, pose)
+    nearest = np.min([forces - limits.leg_force[:, 0], limits.leg_force[:, 1] - forces])
+    np.testing.assert_allclose(gough.limits(platform, pose).of("leg force"), nearest, rtol=1e-10)
 
 
 # ---- reach ----------------------------------------------------------------------------

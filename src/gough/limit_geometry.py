@@ -10,18 +10,19 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough import struts
 from gough.checks import Array
 from gough.errors import PlatformError
 from gough.machine_limits import MachineLimits, Payload
+from gough.platform_checks import COINCIDENT
 from gough.pose import Pose
 
 if TYPE_CHECKING:
     from gough.platform import Platform
 
 PAIRS = tuple(combinations(range(6), 2))  # of legs, in the order of all arrays (..., 15)
-SHARED = 1e-9  # joints closer than this share of the size are one, and their legs always touch
 
 
 def joint_angles(platform: Platform, pose: Pose) -> tuple[Array, Array]:
@@ -41,7 +42,7 @@ def joint_angles(platform: Platform, pose: Pose) -> tuple[Array, Array]:
         >>> platform = gough.Platform.load("reference")
         >>> lifted = gough.Pose(platform.home.position + [0, 0, 50])
         >>> gough.joint_angles(platform, lifted)[0].round(4)
-        array([0.0314, 0.0314, 0.0314, 0.0314, 0.0314, 0.0314])
+        array([0.0287, 0.0287, 0.0287, 0.0287, 0.0287, 0.0287])
     """
     _, rods, frames = leg_bodies(platform, pose)
     base_axes, moving_axes = joint_axes(platform)
@@ -176,11 +177,11 @@ def segment_distance(p: Array, u: Array, q: Array, v: Array) -> Array:
     return np.linalg.norm(between + s[..., None] * u - t[..., None] * v, axis=-1)
 
 
-def shared_joints(platform: Platform) -> Array:
+def shared_joints(platform: Platform) -> NDArray[np.bool_]:
     """Pairs of legs (15,) that have a joint in common, as booleans: their gap is always 0."""
     first, second = np.array(PAIRS).T
     gaps = [np.linalg.norm(p[first] - p[second], axis=-1) for p in (platform.base, platform.moving)]
-    return np.min(gaps, axis=0) <= SHARED * platform.size
+    return np.min(gaps, axis=0) <= COINCIDENT * platform.size
 
 
 def _strut_vectors(platform: Platform, pose: Pose) -> Array:

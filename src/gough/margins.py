@@ -129,9 +129,9 @@ def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None
         >>> lifted = gough.Pose(platform.home.position + [0, 0, 0.008], platform.home.wxyz)
         >>> found = gough.limits(platform, lifted)
         >>> found
-        Limits(z: workspace, 0.0805 left)
+        Limits(z: workspace, 0.389 left)
         >>> found.of("stroke").round(4)
-        np.float64(0.0057)
+        np.float64(0.0076)
     """
     poses = as_pose(pose)
     constants = limit_constants(platform)
@@ -142,11 +142,13 @@ def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None
         len(position), workers,
     )  # fmt: skip
     kinds = np.flatnonzero(constants[STATED : STATED + KINDS])
-    margin, share, part = (
-        values.reshape(*poses.batch, KINDS)[..., kinds] for values in out[:3]
-    )  # fmt: skip
+    margin, share, part, broken = out
+    shape = (*poses.batch, KINDS)
     names = tuple(NAMES[kind] for kind in kinds)
-    return Limits(names, margin, share, part, out[3].reshape(poses.batch))
+    return Limits(
+        names, margin.reshape(shape)[..., kinds], share.reshape(shape)[..., kinds],
+        part.reshape(shape)[..., kinds], broken.reshape(poses.batch),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +204,8 @@ def reach(platform: Platform, pose: Pose | Table, *, workers: int | None = None)
         >>> import gough
         >>> platform = gough.Platform.load("rubin_camera")
         >>> found = gough.reach(platform, platform.home)
-        >>> found.distance[2].round(4), found.limit[2, 1]
-        (array([0.0087, 0.0087]), 'z: workspace')
+        >>> found.distance[2].round(4), found.limit[2].tolist()
+        (array([0.0131, 0.0131]), ['z: workspace', 'z: workspace'])
     """
     poses = as_pose(pose)
     constants = limit_constants(platform)

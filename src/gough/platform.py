@@ -121,8 +121,8 @@ class Platform:
             object.__setattr__(self, field, value)
         at_home = self._moving_at_home()
         platform_checks.check_joints(self.base, self.moving, at_home, self.size, rotary is None)
-        limits = platform_checks.stroke_limits(stroke, legs, self.home_legs)
-        object.__setattr__(self, "stroke", limits)
+        ends = platform_checks.stroke_limits(stroke, legs, self.home_legs)
+        object.__setattr__(self, "stroke", ends)
         limit_geometry.check_home(self)
 
     # ---- files ------------------------------------------------------------------------
