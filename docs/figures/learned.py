@@ -37,7 +37,7 @@ def universal() -> Figure:
     axes[1].set(xlabel="distance from the training set [share of the size]")
     axes[0].set(ylabel="mean position error [% of the size]")
     axes[0].legend(loc="lower right")
-    axes[2].text(0.98, 0.015, "0.015 %", color=GREEN, ha="right", va="bottom", fontsize=7,
+    axes[2].text(0.02, 0.015, "0.015 %", color=GREEN, ha="left", va="bottom", fontsize=7,
                  transform=axes[2].get_yaxis_transform())  # fmt: skip
     return whole
 
