@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import machines
 import numpy as np
 import pytest
@@ -9,11 +11,14 @@ import support
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
+from shell import run
 from support import Floats
 
 import gough
-from gough import Frames, GoughError, Platform, PlatformError, Pose, quaternion
+from gough import Frames, GoughError, InputError, Platform, PlatformError, Pose, quaternion
 from gough.export.linuxcnc import in_unit
+from gough.files import convert
+from gough.files.trajectory import open_trajectory
 from gough.platform_file import from_toml
 
 ORDERS = st.permutations("xyz").map("".join)
@@ -102,6 +107,82 @@ def test_without_frames_the_tool_is_the_platform_and_work_is_the_base() -> None:
     )
     np.testing.assert_allclose(shift, pivot_moves, rtol=0, atol=1e-15)
     np.testing.assert_allclose(turn, 0, atol=1e-15)
+
+
+# ---- solving --------------------------------------------------------------------------
+
+MACHINE = Platform.load("rubin_camera").with_frames(
+    {
+        "base_in_world": Pose.from_euler([0.1, -0.2, 2.0], np.radians([1, -2, 30])),
+        "tool_in_platform": Pose.from_euler([0.0, 0.01, -0.4], np.radians([180, 0, 5])),
+        "work_in_world": [0.0, 0.3, 1.0],
+    }
+)
+TOOL = "tool in work"
+
+
+def test_solve_and_leg_lengths_speak_of_the_same_frame() -> None:
+    poses = MACHINE.sample_poses(50)
+    legs = gough.leg_lengths(MACHINE, poses)
+    tool = MACHINE.frame(TOOL).of(poses)
+    found = gough.solve(MACHINE, legs, frame=TOOL)
+    assert found.frame == found[0].frame == TOOL
+    shift, turn = found.pose.distance(tool)
+    assert np.max(shift) <= 1e-12
+    assert np.max(turn) <= 1e-12
+    np.testing.assert_allclose(gough.leg_lengths(MACHINE, tool, TOOL), legs, atol=1e-14)
+
+
+def test_a_pose_as_first_guess_is_one_of_the_frame() -> None:
+    poses = MACHINE.sample_poses(5)
+    legs = gough.leg_lengths(MACHINE, poses)
+    guess = MACHINE.frame(TOOL).of(poses)
+    found = gough.solve(MACHINE, legs, seed=guess, max_iterations=0, frame=TOOL)
+    assert np.max(found.pose.distance(guess)[0]) <= 1e-14
+
+
+def test_the_covariance_is_that_of_the_frame() -> None:
+    pose = MACHINE.sample_poses(1)[0]
+    legs = gough.leg_lengths(MACHINE, pose)
+    found = gough.solve(MACHINE, legs, leg_noise=1e-6, frame=TOOL)
+    noise = np.random.default_rng(0).normal(size=(20_000, 6)) * 1e-6
+    cloud = gough.solve(MACHINE, legs + noise, frame=TOOL).pose
+    turns = (cloud.as_scipy() * found.pose.as_scipy().inv()).as_rotvec()
+    sample = np.cov(np.hstack([cloud.position, turns]).T)
+    assert found.covariance is not None
+    scale = np.sqrt(np.outer(np.diag(sample), np.diag(sample)))
+    np.testing.assert_allclose(found.covariance / scale, sample / scale, atol=0.04)
+
+
+def test_parquet_states_the_frame_of_its_poses(tmp_path: Path) -> None:
+    legs = gough.leg_lengths(MACHINE, MACHINE.sample_poses(20))
+    MACHINE.save(tmp_path / "machine.toml")
+    files = [str(tmp_path / name) for name in ("legs.csv", "poses.parquet", "back.csv")]
+    header = ",".join(f"leg_{i}" for i in range(1, 7))
+    np.savetxt(files[0], legs, delimiter=",", header=header, comments="", fmt="%.17g")
+    convert.solve_file(files[0], files[1], MACHINE, frame=TOOL)
+    convert.inverse_file(files[1], files[2], MACHINE)  # by the frame that the file states
+    back = np.loadtxt(files[2], delimiter=",", skiprows=1, usecols=range(6))
+    np.testing.assert_allclose(back, legs, atol=1e-12)
+    with pytest.raises(InputError, match="are those of 'tool in work', not of 'tool in base'"):
+        convert.inverse_file(files[1], None, MACHINE, frame="tool in base")
+    other = MACHINE.with_frames({"tool_in_platform": [0, 0, 1]})
+    with pytest.raises(InputError, match=r"states other \[frames\] now"):
+        convert.inverse_file(files[1], None, other)
+    with open_trajectory(files[1], MACHINE) as file:
+        read = np.concatenate([file.solve(rows).legs for rows in file.blocks()])
+    np.testing.assert_allclose(read, legs, atol=1e-12)
+
+
+def test_the_commands_take_a_frame(tmp_path: Path) -> None:
+    file = tmp_path / "machine.toml"
+    MACHINE.save(file)
+    said, code = run(f"gough solve 0 0 0 0 0 0 -p {file} --frame 'tool in work'")
+    assert code == 0
+    assert "poses of tool in work" in said
+    said, code = run(f"gough solve 0 0 0 0 0 0 -p {file} --frame 'tol in work'")
+    assert code == 2
+    assert "did you mean 'tool'? frames that move with the platform are platform, tool" in said
 
 
 # ---- files ----------------------------------------------------------------------------

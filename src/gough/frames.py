@@ -18,6 +18,8 @@ frame's, by which velocities and covariances are carried over (Lynch and Park, M
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -97,6 +99,12 @@ class FramePose:
     pivot: Array
     before: Pose
     after: Pose
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of where the two frames are."""
+        ends = [part.tolist() for p in (self.before, self.after) for part in (p.position, p.wxyz)]
+        return hashlib.sha256(json.dumps(ends).encode()).hexdigest()
 
     def of(self, pose: Pose) -> Pose:
         """Poses (...) of the frame, from those of the platform."""

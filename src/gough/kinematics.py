@@ -38,11 +38,13 @@ def strut_vectors(platform: Platform, pose: Pose) -> Array:
     return joint_positions(platform, pose) - platform.base
 
 
-def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
+def leg_lengths(platform: Platform, pose: Pose | Table, frame: str | None = None) -> Array:
     """Inverse kinematics: readings of the six legs, (..., 6).
 
     Args:
         pose: batch axes (...), or a table of N poses (see `Pose.from_frame`).
+        frame: whose poses these are, such as "tool in work" (see `Platform.frame`); those of the
+            platform unless given.
 
     Returns:
         Lengths [platform unit], lengths minus those at home [platform unit], or motor angles
@@ -50,7 +52,7 @@ def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
         NaN where a motor's arm and rod cannot reach, and where a row of a table holds no pose.
 
     Raises:
-        GoughError: neither poses nor a table, or a table with other columns.
+        GoughError: neither poses nor a table, a table with other columns, or an unknown frame.
 
     Example:
         >>> import gough
@@ -58,7 +60,10 @@ def leg_lengths(platform: Platform, pose: Pose | Table) -> Array:
         >>> gough.leg_lengths(platform, platform.home).shape
         (6,)
     """
-    vectors = strut_vectors(platform, as_pose(pose))
+    poses = as_pose(pose)
+    if frame is not None:
+        poses = platform.frame(frame).platform_pose(poses)
+    vectors = strut_vectors(platform, poses)
     return struts.readings(vectors, platform.true_at_zero, platform.gain, platform.rotary)
 
 

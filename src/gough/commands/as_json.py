@@ -50,6 +50,7 @@ def report_facts(report: Report, platform: Platform, rows: list[dict]) -> dict:
     return {
         "platform": platform.name,
         "unit": platform.unit,
+        "frame": report.frame,
         "rows": report.rows,
         "usable": report.rows - report.failures,
         "seconds": report.seconds,

@@ -9,6 +9,7 @@ from tyro.conf import OmitArgPrefixes, Positional
 from gough.commands.options import (
     AllowFailures,
     BlockRows,
+    Frame,
     Head,
     IgnorePlatform,
     Json,
@@ -27,6 +28,7 @@ def run(
     *,
     platform: PlatformName,
     out: Out = None,
+    frame: Frame = None,
     keep: Keep = "",
     keep_bad_rows: KeepBadRows = False,
     allow_failures: AllowFailures = False,
@@ -60,7 +62,7 @@ def run(
     machine = Platform.load(platform)
     with show.progress_bar() as progress:
         report = inverse_file(
-            given, out, machine, progress=progress, head=0 if out else head,
+            given, out, machine, frame=frame, progress=progress, head=0 if out else head,
             reading=reading_options(
                 platform, keep, keep_bad_rows, ignore_platform, block_rows, log
             ),

@@ -30,6 +30,14 @@ PlatformName = Annotated[
         help="Use this machine: a name in the catalog (gough platforms) or a .toml file.",
     ),
 ]
+Frame = Annotated[
+    str | None,
+    option(
+        "Take poses as those of this frame of the platform's file, such as 'tool in work', "
+        "instead of those of the platform.",
+        metavar="'A in B'",
+    ),
+]
 Out = Annotated[
     str | None,
     option(

@@ -123,6 +123,8 @@ def print_poses(report: Report, platform: Platform, screen: Console) -> None:
     """Print the first poses, angles in degrees."""
     unit = f" [{platform.unit}]".replace("[", r"\[") if platform.unit else ""
     heads = [f">{name}{unit}" for name in ("x", "y", "z")]
+    if report.frame:
+        screen.print(f"poses of {report.frame}", markup=False)
     table = plain_table(*heads, ">rx_deg", ">ry_deg", ">rz_deg", "status")
     places = _decimals(platform.size)
     angles = np.degrees(report.pose.euler)

@@ -10,6 +10,7 @@ from gough.commands.given import Legs
 from gough.commands.options import (
     AllowFailures,
     BlockRows,
+    Frame,
     Head,
     IgnorePlatform,
     Json,
@@ -28,6 +29,7 @@ def run(
     *,
     platform: PlatformName,
     out: Out = None,
+    frame: Frame = None,
     seed: Annotated[str, arg(metavar="NAME")] = "auto",
     tolerance: Annotated[float, arg(metavar="T")] = 1e-12,
     max_iterations: Annotated[int, arg(metavar="N")] = 60,
@@ -83,7 +85,7 @@ def run(
                 platform, keep, keep_bad_rows, ignore_platform, block_rows, log
             ),
             head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
-            workers=workers,
+            workers=workers, frame=frame,
         )  # fmt: skip
     if json:
         poses = as_json.first_poses(report, angles)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -29,6 +30,7 @@ from gough.files.formats import (
     file_format,
     open_sink,
     open_source,
+    source_frame,
 )
 from gough.files.log_format import LogFormat
 from gough.files.metadata import describe
@@ -89,9 +91,10 @@ def solve_file(
     """
     from gough.fk.solve import Solver
 
-    report = Report(tuple(Status), head)
+    frame: Any = settings.get("frame")
+    report = Report(tuple(Status), head, frame or "")
     written = solution_names(angles, leg_noise is not None, certify)
-    with _open_job(legs, out, platform, reading, file_leg_columns, written) as job:
+    with _open_job(legs, out, platform, reading, file_leg_columns, written, frame) as job:
         solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
         for block in job.blocks:
             readings = block.numbers(LEGS)
@@ -116,6 +119,7 @@ def inverse_file(
     *,
     reading: Reading = Reading(),
     head: int = 0,
+    frame: str | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Calculate the leg readings of a file of poses, row for row.
@@ -126,6 +130,8 @@ def inverse_file(
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones,
             leg_1 to leg_6 and status; in text the readings have the form `reading.log`.
         platform, reading, head, progress: as for `solve_file`.
+        frame: whose poses the file holds, such as "tool in work"; those that the file states, or
+            else of the platform, unless given.
 
     Raises:
         GoughError: what is wrong, where, and what to do; an old file at `out` is unchanged.
@@ -138,8 +144,10 @@ def inverse_file(
     factor, offset, _ = form.conversion(platform, [""] * 6)
     written = (*form.names, STATUS)
     with _open_job(poses, out, platform, reading, pose_columns, written) as job:
+        view = source_frame(job.source, platform, frame)
         for block in job.blocks:
             pose, fault = poses_from_columns(block.numbers(job.numbers), job.numbers)
+            pose = pose if view is None else view.platform_pose(pose)
             with np.errstate(invalid="ignore"):
                 legs = leg_lengths(platform, pose)
             status = pose_status(platform, pose, legs)
@@ -183,12 +191,14 @@ def _open_job(
     reading: Reading,
     pick: Callable[[str, Sequence[str]], tuple[str, ...]],
     written: Sequence[str],
+    frame: str | None = None,
 ) -> Iterator[_Job]:
     """Open both files, after all checks that need no rows.
 
     Args:
         pick: chooses the columns to convert, as `leg_columns` does.
         written: names of the columns that results are written to.
+        frame: whose poses are written, for the file's metadata.
     """
     _check_paths(path, out)
     check_kept(reading.keep, written)
@@ -196,7 +206,7 @@ def _open_job(
         source = stack.enter_context(closing(open_source(path, platform, reading)))
         numbers = pick(source.where, source.columns)
         keep = checked(source.where, source.columns, tuple(dict.fromkeys(reading.keep)))
-        sink = stack.enter_context(open_sink(out, describe(platform))) if out else None
+        sink = stack.enter_context(open_sink(out, describe(platform, frame))) if out else None
         typed = out is not None and file_format(out) == ".parquet"
         blocks = source.blocks(numbers, keep, typed=typed)
         yield _Job(source, blocks, numbers, keep, sink)

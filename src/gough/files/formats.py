@@ -21,10 +21,11 @@ from gough.errors import GoughError, InputError
 from gough.files.csv import CsvSink, CsvSource
 from gough.files.excel import EXCEL, open_sheet
 from gough.files.log_format import LogFormat, split_unit
-from gough.files.metadata import check_same, describe
+from gough.files.metadata import check_same, describe, pose_frame
 from gough.files.parquet import ParquetSink, ParquetSource
 from gough.files.plausible import check_plausible
 from gough.files.rows import Reading, Sink, Source
+from gough.frames import FramePose
 from gough.platform import Platform
 from gough.whole_file import explain, replacing
 
@@ -120,6 +121,19 @@ def open_source(
     if notes:
         log.warning("%s: %s", source.where, "; ".join(notes))
     return source
+
+
+def source_frame(source: Source, platform: Platform, frame: str | None) -> FramePose | None:
+    """The frame whose poses an open file holds; see `pose_frame`.
+
+    Raises:
+        InputError: naming the file, if it states another frame.
+        GoughError: no such frame.
+    """
+    try:
+        return pose_frame(source.metadata, platform, frame)
+    except InputError as error:
+        raise InputError(f"{source.where}: {error}") from None
 
 
 def _name_legs(source: Source, platform: Platform, form: LogFormat) -> list[str]:

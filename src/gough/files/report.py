@@ -29,11 +29,13 @@ class Report:
         invalid: place and fault of each of the first few invalid rows.
         pose, legs, status: the first rows, at most `head`.
         seconds: time taken by the rows.
+        frame: whose poses those are, such as "tool in work"; "" for the platform's.
         preparing: time before them, to compile the solver and to fit its seed.
     """
 
     outcomes: tuple[Outcome, ...]
     head: int = 0
+    frame: str = ""
     counts: NDArray[np.int64] = field(init=False)
     worst: Array = field(init=False)
     invalid: list[str] = field(default_factory=list)

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from gough.checks import Array
 from gough.columns import LEGS, STATUS, checked, pose_or_leg_columns
 from gough.errors import InputError
-from gough.files.formats import Given, open_source
+from gough.files.formats import Given, open_source, source_frame
 from gough.files.plausible import check_plausible
 from gough.files.rows import Block, Reading, Source
+from gough.frames import FramePose
 from gough.home_mode import pose_status
 from gough.kinematics import leg_lengths
 from gough.platform import Platform
@@ -70,6 +71,7 @@ class TrajectoryFile:
         columns: names of the columns of a pose, or `LEGS`.
         time: name of the column of times, or None.
         seed: first guess for leg readings, as for `gough.solve`.
+        frame: whose poses the file holds; None for those of the platform.
     """
 
     source: Source
@@ -77,6 +79,7 @@ class TrajectoryFile:
     columns: tuple[str, ...]
     time: str | None
     seed: str
+    frame: FramePose | None = None
 
     @property
     def has_poses(self) -> bool:
@@ -116,6 +119,7 @@ class TrajectoryFile:
                 found.iterations,
             )  # fmt: skip
         pose, _ = poses_from_columns(values, self.columns)
+        pose = pose if self.frame is None else self.frame.platform_pose(pose)
         with np.errstate(invalid="ignore"):
             legs = leg_lengths(self.platform, pose)
         stated = rows[:, 2].astype(np.int64)
@@ -164,7 +168,8 @@ def open_trajectory(
         columns = pose_or_leg_columns(source.where, source.columns)
         if time is not None:
             checked(source.where, source.columns, (time,))
-        yield TrajectoryFile(source, platform, columns, time, seed)
+        frame = source_frame(source, platform, None)
+        yield TrajectoryFile(source, platform, columns, time, seed, frame)
 
 
 def read_row(

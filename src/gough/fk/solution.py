@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.columns import Angles, solution_names
+from gough.errors import GoughError
+from gough.platform import Platform
 from gough.pose import Pose, pose_cells, pose_table
 from gough.status import USABLE, Status
 from gough.tables import Kind, Table, TableInfo, label_column, make_frame, number_column
@@ -35,6 +37,7 @@ class Solution:
         radius: (...) radius of uniqueness [platform unit], see `gough.Certificate`, 0 where
             nothing is proven; None without `certify=True`.
         unit: name of the platform's length unit, a label.
+        frame: whose poses these are, such as "tool in work"; "" for those of the platform.
         table: library and row labels of the table of readings, if they came in one.
     """
 
@@ -45,6 +48,7 @@ class Solution:
     covariance: Array | None = None
     radius: Array | None = None
     unit: str = ""
+    frame: str = ""
     table: TableInfo | None = None
 
     @property
@@ -64,8 +68,22 @@ class Solution:
         radius = None if self.radius is None else self.radius[index]
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
-            covariance, radius, self.unit, self.table and self.table.at(index),
+            covariance, radius, self.unit, self.frame, self.table and self.table.at(index),
         )  # fmt: skip
+
+    def in_frame(self, platform: Platform, name: str) -> Solution:
+        """Return the solution with poses of a frame of the platform, and their covariance.
+
+        Raises:
+            GoughError: no such frame, or poses that are those of a frame already.
+        """
+        if self.frame:
+            raise GoughError(f"frame: these are the poses of {self.frame!r} already")
+        view, covariance = platform.frame(name), self.covariance
+        if covariance is not None:
+            matrix = view.twist_matrix(self.pose)
+            covariance = matrix @ covariance @ np.swapaxes(matrix, -1, -2)
+        return replace(self, pose=view.of(self.pose), covariance=covariance, frame=name)
 
     def to_frame(self, kind: Kind | None = None, *, angles: Angles | None = None) -> Table:
         """A table with a row for each pose, in order: the columns that `gough solve` writes.

@@ -36,13 +36,14 @@ def solve(
     restarts: int = 24,
     singular: float = SINGULAR,
     workers: int | None = None,
+    frame: str | None = None,
     leg_noise: ArrayLike | None = None,
     certify: bool = False,
     ambiguous: bool = False,
 ) -> Solution:
     """Poses that have the given leg readings, each with a status.
 
-    Calls a `gough.Solver` made with these settings; see there for `seed` to `workers`, and
+    Calls a `gough.Solver` made with these settings; see there for `seed` to `frame`, and
     `Solver.__call__` for the rest and what is raised.
 
     Example:
@@ -50,7 +51,7 @@ def solve(
         >>> gough.solve(platform, platform.home_legs).status
         <Status.CONVERGED: 0>
     """
-    solver = Solver(platform, seed, tolerance, max_iterations, restarts, singular, workers)
+    solver = Solver(platform, seed, tolerance, max_iterations, restarts, singular, workers, frame)
     return solver(legs, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
 
 
@@ -76,9 +77,11 @@ class Solver:
         singular: distance to singularity (see `singularity_distance`) below which a row is
             reported as near one.
         workers: threads; as many as there are cores unless given.
+        frame: whose poses are returned, such as "tool in work" (see `Platform.frame`); a pose
+            given as seed is one of that frame, too. Those of the platform unless given.
 
     Raises:
-        GoughError: an option out of range, an unknown seed.
+        GoughError: an option out of range, an unknown seed or frame.
         PlatformError: a polynomial seed for a platform without workspace.
 
     Example:
@@ -94,6 +97,7 @@ class Solver:
     restarts: int = 24
     singular: float = SINGULAR
     workers: int | None = None
+    frame: str | None = None
 
     if TYPE_CHECKING:  # what may be passed is wider than what is held
 
@@ -106,6 +110,7 @@ class Solver:
             restarts: int = 24,
             singular: float = SINGULAR,
             workers: int | None = None,
+            frame: str | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -113,8 +118,12 @@ class Solver:
             value = getattr(self, name)
             if not 0 <= value <= high:
                 raise GoughError(f"{name}: expected 0 to {high:g}, found {value!r}")
+        seed: str | Seed | Pose = self.seed
+        if self.frame is not None:
+            view = self.platform.frame(self.frame)
+            seed = view.platform_pose(seed) if isinstance(seed, Pose) else seed
         object.__setattr__(
-            self, "seed", find_seed(self.platform, self.seed, guess_only=not self.max_iterations)
+            self, "seed", find_seed(self.platform, seed, guess_only=not self.max_iterations)
         )
 
     def __call__(
@@ -167,7 +176,8 @@ class Solver:
             self._consult_modes(flat, rows)
         radius = self._certify(flat, rows) if certify else None
         batch = readings.shape[:-1]
-        return _solution(self.platform, rows, radius, batch, leg_noise, table_info(legs))
+        found = _solution(self.platform, rows, radius, batch, leg_noise, table_info(legs))
+        return found if self.frame is None else found.in_frame(self.platform, self.frame)
 
     def compile(self, count: int = 1, *, certify: bool = False) -> None:
         """Compile, or load from disk, all that a batch of `count` rows needs.
@@ -316,6 +326,6 @@ def _solution(
         rows.iterations.reshape(batch),
         None if leg_noise is None else pose_covariance(platform, pose, leg_noise),
         None if radius is None else radius.reshape(batch),
-        platform.unit,
-        source,
+        unit=platform.unit,
+        table=source,
     )
