@@ -58,6 +58,47 @@ def _rate(axes: Axes) -> None:
     axes.set(xlim=(-1.3, 2.9), ylim=(-0.9, 3.9))
 
 
+def frames() -> Figure:
+    """Draw the frames of a machine, who hangs on whom, and the chain from tool to work."""
+    whole = figure(5.4, 3.7)
+    axes = whole.subplots()
+    sketch(axes)
+    base, platform = np.array([1.2, 0.9]), np.array([1.5, 2.6])
+    axes.plot([0.3, 2.1], [0.9, 0.9], color="#d0d0d0", linewidth=7, solid_capstyle="round")
+    axes.plot([0.85, 2.15], [2.5, 2.7], color="#cfe3f1", linewidth=7, solid_capstyle="round")
+    feet, heads = np.linspace(0.35, 2.05, 6), np.linspace(0.9, 2.1, 6)
+    for i in range(6):
+        x = [feet[i], heads[min(max(i + (-1) ** i, 0), 5)]]
+        axes.plot(x, [0.93, 2.47 + 0.15 * (x[1] - 0.85)], color=GREY, linewidth=1)
+    places = {
+        "world": ((-0.9, 0.1), 0, BLACK, (-0.25, -0.2)),
+        "base": (base, 0, BLACK, (-0.1, -0.25)),
+        "platform": (platform, 9, BLUE, (-0.55, 0.12)),
+        "tool": ((2.3, 3.7), 9, BLUE, (-0.4, 0.1)),
+        "work": ((3.9, 2.2), -20, BLACK, (0.0, -0.3)),
+    }
+    for name, (at, angle, color, beside) in places.items():
+        for turn in (angle, angle + 90):
+            way = 0.42 * np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
+            arrow(axes, at, np.add(at, way), color, 1.4)
+        label(axes, np.add(at, beside), name, color, 10)
+    chain = [("world", "base"), ("platform", "tool"), ("world", "work")]
+    for start, end in chain:
+        arrow(axes, places[start][0], places[end][0], ORANGE, 1.0)
+    arrow(axes, base, platform, VERMILION, 2.0)
+    arrow(axes, places["work"][0], places["tool"][0], GREEN, 2.0)
+    for at, text, color in (
+        ((0.1, 0.3), "base_in_world", ORANGE),
+        ((1.55, 3.2), "tool_in_platform", ORANGE),
+        ((2.95, 1.45), "work_in_world", ORANGE),
+        ((1.62, 1.75), "the legs", VERMILION),
+        ((3.35, 3.1), "tool in work", GREEN),
+    ):
+        label(axes, at, text, color, 9)
+    axes.set(xlim=(-1.6, 4.9), ylim=(-0.35, 4.3))
+    return whole
+
+
 def _plates(axes: Axes, foot, centre, head) -> None:
     """Draw base and platform as bars with their joints."""
     axes.plot([-1.1, 2.5], [-0.02, 0.33], color="#d0d0d0", linewidth=7, solid_capstyle="round")
@@ -95,4 +136,4 @@ def certificate() -> Figure:
     return whole
 
 
-FIGURES = {"leg_equation": leg_equation, "certificate": certificate}
+FIGURES = {"leg_equation": leg_equation, "certificate": certificate, "frames": frames}
