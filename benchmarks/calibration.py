@@ -95,9 +95,7 @@ class Trial:
         ideal = Problem(problem.parameters, sensor, exact, problem.leg_sigma)
         state = State(known.values, place, body)
         covariance = minimise(ideal, state, iterations=0).covariance
-        workspace = Workspace(ideal)
-        workspace.legs, workspace.near = legs, near
-        return workspace.error(state, covariance).position
+        return Workspace(ideal, legs, near).error(state, covariance).position
 
 
 def spoil(pose: gough.Pose, share: float, seed: int, mm: float) -> tuple[gough.Pose, np.ndarray]:

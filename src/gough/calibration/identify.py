@@ -7,7 +7,7 @@ import numpy as np
 from gough.calibration.arrays import Array
 from gough.calibration.estimate import Problem, State
 from gough.calibration.parameters import Parameters
-from gough.calibration.prediction import Workspace, workspace_readings
+from gough.calibration.prediction import Workspace
 from gough.calibration.sensors import Sensor
 
 ZERO = 1e-10  # of the largest singular value: below it a combination is not seen at all
@@ -43,11 +43,8 @@ def rank(parameters: Parameters, sensor: Sensor, place: object) -> int:
 
     From many poses spread over the workspace: what more poses of the same kind could show.
     """
-    legs, near = workspace_readings(parameters.drawing, 200)
-    problem = Problem(parameters, sensor, legs, 1.0)
-    state = State(parameters.values(parameters.drawing), place, near)
-    workspace = Workspace.__new__(Workspace)
-    workspace.problem, workspace.legs, workspace.near = problem, legs, near
+    workspace = Workspace.of(Problem(parameters, sensor, np.zeros((0, 6)), 1.0))
+    state = State(parameters.drawn, place, workspace.near)
     G = workspace.derivatives(state)[0][..., : parameters.drawn.size]
     units = np.ones(G.shape[1])
     if sensor.kind == "pose":

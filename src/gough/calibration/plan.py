@@ -106,7 +106,7 @@ def plan_poses(
     instrument, place = _instrument(platform, kind, noise, near)
     problem = Problem(parameters, instrument, legs, leg_noise)
     state = State(parameters.drawn, place, near)
-    workspace = Workspace(problem)
+    workspace = Workspace.of(problem)
     G = workspace.derivatives(state)[0]
     rows, weighted = whiten(problem.rows(state)[0])[1], _weighted(G, kind, platform)
     chosen, covariance = _choose(rows, _prior(parameters, place, rows), weighted, count)

@@ -8,7 +8,7 @@ between its predictions and the calibrated machine's.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,6 @@ from gough.calibration.estimate import Estimate, Problem, State, place_instrumen
 from gough.calibration.residuals import Rigid, forward
 from gough.calibration.sensors import per_leg
 from gough.kinematics import leg_lengths
-from gough.platform import Platform
-from gough.pose import Pose
 from gough.workspace import Workspace as Box
 
 POSES = 200  # of the workspace, over which errors are averaged
@@ -39,17 +37,33 @@ class Error:
     rotation: float
 
 
+@dataclass(frozen=True, eq=False)
 class Workspace:
     """Readings over a machine's workspace, with errors as the instrument sees them.
 
     Attributes:
+        problem: the instrument, and the layout of the parameters.
         legs: (t, 6) readings.
+        near: (t) poses close to those of the readings.
     """
 
-    def __init__(self, problem: Problem, poses: Pose | None = None) -> None:
-        """Sample the drawing's workspace, within stroke; `poses` where it states none."""
-        self.problem = problem
-        self.legs, self.near = workspace_readings(problem.parameters.drawing, POSES, poses)
+    problem: Problem
+    legs: Array
+    near: Rigid
+
+    @classmethod
+    def of(cls, problem: Problem) -> Workspace:
+        """Sample the drawing's workspace within stroke, or a small box where it states none."""
+        drawing = problem.parameters.drawing
+        box = drawing.workspace or Box.about_home(0.1 * drawing.size, 10.0)
+        poses = replace(drawing, workspace=box).sample_poses(8 * POSES, seed=1)
+        legs = leg_lengths(drawing, poses)
+        good = np.all(np.isfinite(legs), axis=-1)
+        if drawing.stroke is not None:
+            low, high = drawing.stroke.T
+            good &= np.all((legs >= low) & (legs <= high), axis=-1)
+        chosen = np.flatnonzero(good)[:POSES]
+        return cls(problem, legs[chosen], Rigid.of(poses[chosen], drawing.pivot_point))
 
     def derivatives(self, state: State) -> tuple[Array, Rigid]:
         """G (t, m, P) of what is measured by parameters and placement, and the poses X (t)."""
@@ -113,24 +127,6 @@ def _symmetric(matrix: Array) -> Array:
     scale = np.sqrt(np.diag(matrix))
     even = (matrix + matrix.T) / 2 / np.outer(scale, scale)
     return (even + 1e-12 * np.eye(len(scale))) * np.outer(scale, scale)
-
-
-def workspace_readings(
-    drawing: Platform, count: int, poses: Pose | None = None
-) -> tuple[Array, Rigid]:
-    """Readings (count, 6) of workspace poses within stroke, and the poses themselves."""
-    if drawing.workspace is not None:
-        poses = drawing.sample_poses(8 * count, seed=1)
-    elif poses is None:
-        box = Box.about_home(0.1 * drawing.size, 10.0)
-        poses = box.sample(drawing.home, 8 * count, 1)
-    assert poses is not None
-    legs = leg_lengths(drawing, poses)
-    good = np.all(np.isfinite(legs), axis=-1)
-    if drawing.stroke is not None:
-        good &= np.all((legs >= drawing.stroke[:, 0]) & (legs <= drawing.stroke[:, 1]), axis=-1)
-    chosen = np.flatnonzero(good)[:count]
-    return legs[chosen], Rigid.of(poses[chosen], drawing.pivot_point)
 
 
 def leave_one_out(problem: Problem, estimate: Estimate, drawn: State) -> tuple[Array, Array]:

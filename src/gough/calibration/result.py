@@ -108,7 +108,7 @@ class Calibration:
     @cached_property
     def workspace(self) -> prediction.Workspace:
         """Poses over which errors are averaged."""
-        return prediction.Workspace(self.problem)
+        return prediction.Workspace.of(self.problem)
 
     @cached_property
     def predicted_error(self) -> prediction.Error:
