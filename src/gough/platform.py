@@ -278,12 +278,15 @@ class Platform:
         Raises:
             PlatformError: the platform states no workspace.
         """
+        return self._workspace().sample(self.home, count, seed)
+
+    def _workspace(self) -> Workspace:
         if self.workspace is None:
             raise PlatformError(
                 f"workspace: platform {self.name!r} states none; add a [workspace] table or call "
                 "with_workspace(translation, rotation_deg)"
             )
-        return self.workspace.sample(self.home, count, seed)
+        return self.workspace
 
     def in_workspace(self, pose: Pose) -> NDArray[np.bool_]:
         """Whether poses (...) are in the workspace; True where none is stated.
