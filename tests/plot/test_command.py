@@ -88,6 +88,15 @@ def test_errors_of_several_files(gough_command):
     assert "rubin_camera_errors.svg: written" in out
 
 
+def test_a_log_is_read_with_the_options_of_solve(gough_command):
+    platform = gough.Platform.load("reference")
+    legs = gough.leg_lengths(platform, platform.sample_poses(5)) / 10
+    np.savetxt("log.csv", legs, delimiter=",", header="a,b,c,d,e,f", comments="")
+    arguments = ("trajectory", "log.csv", "-p", "reference", "--columns", "a,b,c,d,e,f")
+    assert gough_command("plot", *arguments)[0] == 2  # they are in centimetres
+    assert gough_command("plot", *arguments, "--unit", "cm")[0] == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

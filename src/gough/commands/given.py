@@ -59,12 +59,12 @@ def readings_given(words: tuple[str, ...], platform: Platform, name: str) -> Arr
     Raises:
         InputError: neither six numbers nor a file that can be read.
     """
-    from gough.commands.options import reading_options
+    from gough.commands.options import ReadingOptions
     from gough.files import read_legs
 
     if not words:
         return platform.home_legs
-    legs = read_legs(legs_given(words), platform, reading_options(name))
+    legs = read_legs(legs_given(words), platform, ReadingOptions().of(name))
     return legs[0] if len(words) == 6 else legs
 
 

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional
+from tyro.conf import Positional
 
 from gough.commands.options import (
     AllowFailures,
-    BlockRows,
+    FileOptions,
     Frame,
     Head,
-    IgnorePlatform,
     Json,
     Keep,
-    KeepBadRows,
-    LogOptions,
     Out,
     PlatformName,
+    ReadingOptions,
     option,
-    reading_options,
 )
 
 
@@ -30,13 +27,10 @@ def run(
     out: Out = None,
     frame: Frame = None,
     keep: Keep = "",
-    keep_bad_rows: KeepBadRows = False,
     allow_failures: AllowFailures = False,
-    ignore_platform: IgnorePlatform = False,
     head: Head = 5,
     json: Json = False,
-    block_rows: BlockRows = 65536,
-    log: OmitArgPrefixes[LogOptions] = LogOptions(),  # noqa: B008 - frozen
+    reading: FileOptions = ReadingOptions(),
 ) -> int:
     """Calculate leg readings from poses.
 
@@ -63,9 +57,7 @@ def run(
     with show.progress_bar() as progress:
         report = inverse_file(
             given, out, machine, frame=frame, progress=progress, head=0 if out else head,
-            reading=reading_options(
-                platform, keep, keep_bad_rows, ignore_platform, block_rows, log
-            ),
+            reading=reading.of(platform, keep),
         )  # fmt: skip
     if json:
         rows = as_json.first_legs(report)

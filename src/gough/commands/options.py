@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import arg
+from tyro.conf import OmitArgPrefixes, arg
 
 if TYPE_CHECKING:
     from gough.files import Reading
@@ -48,19 +48,8 @@ Out = Annotated[
     ),
 ]
 Keep = Annotated[str, option("Copy these columns to the output, such as time,id.", "COLUMNS")]
-KeepBadRows = Annotated[
-    bool,
-    option(
-        "Mark rows with text in a number column, or with too few or too many fields, as invalid "
-        "and go on."
-    ),
-]
-IgnorePlatform = Annotated[
-    bool, option("Accept a file that was written for another platform or unit.")
-]
 AllowFailures = Annotated[bool, option("Exit with 0 even if some rows have no usable result.")]
 Head = Annotated[int, arg(metavar="N", help="Print this many rows where no file is written.")]
-BlockRows = Annotated[int, arg(metavar="N", help="Hold this many rows in memory at a time.")]
 Json = Annotated[bool, option("Print the answer as JSON on standard output instead of text.")]
 RandomSeed = Annotated[int, arg(metavar="N", help="Draw from this seed of the random numbers.")]
 WorkspaceBox = Annotated[
@@ -76,8 +65,8 @@ SameAssembly = Annotated[
 
 
 @dataclass(frozen=True)
-class LogOptions:
-    """The form of leg readings in a file; options go before the platform file's [readings]."""
+class ReadingOptions:
+    """Reading of files; columns to decimal go before the platform file's [readings]."""
 
     columns: Annotated[
         str,
@@ -104,20 +93,32 @@ class LogOptions:
     decimal: Annotated[
         Literal[".", ","] | None, option("Read numbers with this decimal sign.", ".|,")
     ] = None
+    keep_bad_rows: Annotated[
+        bool,
+        option(
+            "Mark rows with text in a number column, or with too few or too many fields, as "
+            "invalid and go on."
+        ),
+    ] = False
+    ignore_platform: Annotated[
+        bool, option("Accept a file that was written for another platform or unit.")
+    ] = False
+    block_rows: Annotated[
+        int, arg(metavar="N", help="Hold this many rows in memory at a time.")
+    ] = 65536
+
+    def of(self, platform: str, keep: str = "") -> Reading:
+        """Options for reading a file of a platform, by its name or file.
+
+        Args:
+            keep: names of columns to copy, with commas between them.
+        """
+        from gough.files import LogFormat, Reading
+
+        form = vars(self).copy()
+        rows = {name: form.pop(name) for name in ("keep_bad_rows", "ignore_platform", "block_rows")}
+        names = tuple(name.strip() for name in keep.split(",") if name.strip())
+        return Reading(names, log=LogFormat.of(platform, **form), **rows)
 
 
-def reading_options(
-    platform: str,
-    keep: str = "",
-    keep_bad_rows: bool = False,
-    ignore_platform: bool = False,
-    block_rows: int = 65536,
-    log: LogOptions = LogOptions(),
-) -> Reading:
-    """The options for reading a file, from the platform's file and the text of the command line."""
-    from gough.files import Reading
-    from gough.files.log_format import LogFormat
-
-    names = tuple(name.strip() for name in keep.split(",") if name.strip())
-    form = LogFormat.of(platform, **vars(log))
-    return Reading(names, keep_bad_rows, ignore_platform, block_rows, form)
+FileOptions = OmitArgPrefixes[ReadingOptions]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from gough.commands.given import Legs, PoseNumbers
-from gough.commands.options import BlockRows, IgnorePlatform, KeepBadRows, PlatformName, option
+from gough.commands.options import FileOptions, PlatformName, ReadingOptions, option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,11 +52,10 @@ def pose(
         row: Take the row of this number in the file, from 1.
     """
     from gough.commands.given import row_given
-    from gough.commands.options import reading_options
     from gough.plot.pose import pose_figure
 
     machine = _machine(platform, out, "pose")
-    given = row_given(legs, pose, machine, row, reading_options(platform))
+    given = row_given(legs, pose, machine, row, ReadingOptions().of(platform))
     if given is not None and len(legs) > 1:
         print(f"{given.outcomes[0].label}: {given.outcomes[0].text}")
     found = machine.home if given is None else given.pose[0]
@@ -148,9 +147,7 @@ def trajectory(
     time: Annotated[str | None, option(metavar="COLUMN")] = None,
     out: Picture = None,
     seed: Annotated[str, arg(metavar="NAME")] = "auto",
-    keep_bad_rows: KeepBadRows = False,
-    ignore_platform: IgnorePlatform = False,
-    block_rows: BlockRows = 65536,
+    reading: FileOptions = ReadingOptions(),
 ) -> int:
     """Draw leg readings and pose over the rows of a file, with the stroke limits.
 
@@ -166,13 +163,11 @@ def trajectory(
             without it over the numbers of the rows.
         seed: Start from this first guess, as in gough solve.
     """
-    from gough.commands.options import reading_options
     from gough.plot.trajectory import note, read_trajectory, trajectory_figure
 
     machine = _machine(platform, out, "trajectory")
-    reading = reading_options(platform, "", keep_bad_rows, ignore_platform, block_rows)
     envelope = read_trajectory(
-        file, machine, time=time, seed=seed, reading=reading, tick=_check_signals
+        file, machine, time=time, seed=seed, reading=reading.of(platform), tick=_check_signals
     )
     figure = trajectory_figure(machine, envelope, time=time or "row",
                                title=f"{machine.name}: {_name(file)}")  # fmt: skip
@@ -190,9 +185,7 @@ def errors(
     truth: Annotated[str | None, option(metavar="POSES")] = None,
     all_rows: Annotated[bool, option()] = False,
     out: Picture = None,
-    keep_bad_rows: KeepBadRows = False,
-    ignore_platform: IgnorePlatform = False,
-    block_rows: BlockRows = 65536,
+    reading: FileOptions = ReadingOptions(),
 ) -> int:
     """Draw histograms of residuals and errors of solved files, on logarithmic axes.
 
@@ -205,15 +198,13 @@ def errors(
         truth: Compare their poses with this file of the true poses, row for row.
         all_rows: Include rows whose status is not usable, such as first guesses.
     """
-    from gough.commands.options import reading_options
     from gough.errors import InputError
     from gough.plot.histograms import histogram_figure, read_errors
     from gough.plot.style import length_unit
 
     if not files:
         raise InputError("FILE: expected a .csv or .parquet file that gough solve wrote")
-    machine = _machine(platform, out, "errors")
-    reading = reading_options(platform, "", keep_bad_rows, ignore_platform, block_rows)
+    machine, options = _machine(platform, out, "errors"), reading.of(platform)
     unit = length_unit(machine)
     labels = {
         "residual": f"residual: largest leg error [{unit}]",
@@ -223,7 +214,7 @@ def errors(
     panels: dict[str, dict[str, Any]] = {}
     for file in files:
         found = read_errors(
-            file, machine, truth, all_rows=all_rows, reading=reading, tick=_check_signals
+            file, machine, truth, all_rows=all_rows, reading=options, tick=_check_signals
         )
         for quantity, histogram in found.items():
             panels.setdefault(labels[quantity], {})[file] = histogram

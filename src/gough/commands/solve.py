@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from tyro.conf import OmitArgPrefixes, arg
+from tyro.conf import arg
 
 from gough.commands.given import Legs
 from gough.commands.options import (
     AllowFailures,
-    BlockRows,
+    FileOptions,
     Frame,
     Head,
-    IgnorePlatform,
     Json,
     Keep,
-    KeepBadRows,
-    LogOptions,
     Out,
     PlatformName,
+    ReadingOptions,
     option,
-    reading_options,
 )
 
 
@@ -37,13 +34,10 @@ def run(
     leg_noise: Annotated[float | None, option(metavar="S")] = None,
     angles: Annotated[Literal["deg", "rad"] | None, option(metavar="deg|rad")] = None,
     keep: Keep = "",
-    keep_bad_rows: KeepBadRows = False,
     allow_failures: AllowFailures = False,
-    ignore_platform: IgnorePlatform = False,
     head: Head = 5,
     json: Json = False,
-    block_rows: BlockRows = 65536,
-    log: OmitArgPrefixes[LogOptions] = LogOptions(),  # noqa: B008 - frozen
+    reading: FileOptions = ReadingOptions(),
 ) -> int:
     """Calculate poses from leg readings.
 
@@ -81,9 +75,7 @@ def run(
     with show.progress_bar() as progress:
         report = solve_file(
             given, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
-            reading=reading_options(
-                platform, keep, keep_bad_rows, ignore_platform, block_rows, log
-            ),
+            reading=reading.of(platform, keep),
             head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
             workers=workers, frame=frame,
         )  # fmt: skip

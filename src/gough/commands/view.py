@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from gough.commands.given import Legs, PoseNumbers
-from gough.commands.options import IgnorePlatform, KeepBadRows, PlatformName, option
+from gough.commands.options import FileOptions, PlatformName, ReadingOptions, option
 
 if TYPE_CHECKING:
     from gough.platform import Platform
@@ -33,8 +33,7 @@ def run(
     open_browser: Annotated[bool, option(name="open")] = False,
     rows: Annotated[int, arg(metavar="N")] = ROWS,
     time: Annotated[str | None, option(metavar="COLUMN")] = None,
-    keep_bad_rows: KeepBadRows = False,
-    ignore_platform: IgnorePlatform = False,
+    reading: FileOptions = ReadingOptions(),
 ) -> int:
     """Show a machine in the browser, and move it by legs, by pose or by hand.
 
@@ -61,7 +60,6 @@ def run(
         time: Play by this column of times [s]; without it 30 rows per second.
     """
     from gough.commands.given import legs_given, row_given
-    from gough.commands.options import reading_options
     from gough.platform import Platform
 
     machine = Platform.load(platform)
@@ -69,14 +67,14 @@ def run(
         from gough.whole_file import check_target
 
         check_target(html)
-    reading = reading_options(platform, "", keep_bad_rows, ignore_platform)
+    options = reading.of(platform)
     played, start = None, None
-    if pose is None and isinstance(file := legs_given(legs) if legs else None, str):
+    if pose is None and isinstance(path := legs_given(legs) if legs else None, str):
         from gough.view.trajectory import read
 
-        played = read(file, machine, rows=rows, time=time, reading=reading)
+        played = read(path, machine, rows=rows, time=time, reading=options)
         print(played.about, flush=True)
-    elif given := row_given(legs, pose, machine, reading=reading):
+    elif given := row_given(legs, pose, machine, reading=options):
         start = given.pose[0]
     if html is not None:
         return _write(html, machine, played, start)
