@@ -540,3 +540,18 @@ def test_parts_can_be_made_by_hand() -> None:
     assert arms is not None
     made = RotaryArms(0.04, 0.085, arms.axis_x.tolist(), arms.axis_y, arms.branch)
     assert replace(REACHY, rotary=made) == REACHY
+
+
+def test_axes_stated_in_a_few_digits_are_made_exact() -> None:
+    arms = REACHY.rotary
+    assert arms is not None
+    rough = replace(arms, axis_x=np.round(arms.axis_x, 7), axis_y=np.round(arms.axis_y, 7))
+    platform = replace(REACHY, rotary=rough)
+    legs = platform.home_legs
+    tips = platform.base + rough.arm_length[:, None] * (
+        np.cos(legs)[:, None] * rough.axis_x + np.sin(legs)[:, None] * rough.axis_y
+    )
+    rods = np.linalg.norm(platform.home.apply(platform.moving) - tips, axis=-1)
+    np.testing.assert_allclose(rods, rough.rod_length, rtol=1e-14)
+    again = RotaryArms(**vars(rough))
+    np.testing.assert_array_equal(again.axis_y, rough.axis_y)

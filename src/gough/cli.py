@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import signal
@@ -28,11 +29,17 @@ def main(arguments: list[str] | None = None) -> None:
     or unwritable output; 130 Ctrl-C; 141 the reader of a pipe is gone; 143 asked to terminate.
     """
     given = sys.argv[1:] if arguments is None else arguments
+    _prepare_streams()
     notes = logging.StreamHandler()  # what readers of files recognised, on standard error
+    notes.setFormatter(_Printable())
     logging.getLogger("gough").addHandler(notes)
     signals.listen()
     code = _run(given)
     signals.ignore()
+    try:
+        sys.stdout.flush()
+    except OSError:  # which has been said
+        _drop_output()
     logging.getLogger("gough").removeHandler(notes)
     sys.exit(code)
 
@@ -124,14 +131,41 @@ def _parse(program: str, functions: Functions, arguments: list[str]) -> int:
 def _print_error(text: str) -> int:
     """Print one line on standard error, which may be closed, and return the exit code."""
     with suppress(OSError):
-        print(text, file=sys.stderr, flush=True)
+        print(_printable(text), file=sys.stderr, flush=True)
     return BAD_USAGE
+
+
+class _Printable(logging.Formatter):
+    """Notes without control characters."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return _printable(super().format(record))
+
+
+def _printable(text: str) -> str:
+    """Text with escapes in place of control characters, which files may have put into it."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def _prepare_streams() -> None:
+    """Make standard streams usable that are closed, or whose encoding lacks characters."""
+    for name, flags, mode in (
+        ("stdin", os.O_RDONLY, "r"),
+        ("stdout", os.O_RDONLY, "w"),  # so that writing to it is an error
+        ("stderr", os.O_WRONLY, "w"),
+    ):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, flags), mode))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _drop_output() -> None:
     """Discard what is buffered for standard output, so that the exit is silent."""
     null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, sys.stdout.fileno())
+    with suppress(OSError):  # a stream without a file
+        os.dup2(null, sys.stdout.fileno())
     os.close(null)
 
 

@@ -61,10 +61,11 @@ def leg_lengths(platform: Platform, pose: Pose | Table, frame: str | None = None
         (6,)
     """
     poses = as_pose(pose)
-    if frame is not None:
-        poses = platform.frame(frame).platform_pose(poses)
-    vectors = strut_vectors(platform, poses)
-    return struts.readings(vectors, platform.true_at_zero, platform.gain, platform.rotary)
+    with np.errstate(over="ignore", invalid="ignore"):  # poses out of reach, and far beyond it
+        if frame is not None:
+            poses = platform.frame(frame).platform_pose(poses)
+        vectors = strut_vectors(platform, poses)
+        return struts.readings(vectors, platform.true_at_zero, platform.gain, platform.rotary)
 
 
 def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Array, Array]:

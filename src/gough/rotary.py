@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from gough.checks import Array, one_or_six, platform_field
+from gough.checks import Array, frozen, one_or_six, platform_field
 from gough.errors import PlatformError
 
 RIGHT_ANGLE = 1e-6  # how far axes may be from unit length and from right angles
+EXACT = 4e-15  # within which they are left as they are
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -24,7 +26,8 @@ class RotaryArms:
         arm_length: (6,) from each motor's axis to its arm's tip, or one for all [platform unit].
         rod_length: (6,) between the two ball joints of each rod, or one for all [platform unit].
         axis_x: (6, 3) unit vectors, where the arm points at angle 0.
-        axis_y: (6, 3) unit vectors, where it points at angle +90 deg.
+        axis_y: (6, 3) unit vectors, where it points at angle +90 deg. Axes that a file states in a
+            few digits are made exact, axis_y perpendicular to axis_x.
         branch: (6,) of +1 or -1: which of the two motor angles that reach a pose is meant,
             q = atan2(y, x) + branch * acos(...), with x, y along axis_x, axis_y.
 
@@ -57,6 +60,9 @@ class RotaryArms:
         ):  # fmt: skip
             object.__setattr__(self, name, platform_field(f"rotary.{name}", given, shape))
         self._check_axes()
+        x, y = _orthonormal(self.axis_x, self.axis_y)
+        object.__setattr__(self, "axis_x", frozen(x))
+        object.__setattr__(self, "axis_y", frozen(y))
 
     def _check_axes(self) -> None:
         if any(abs(sign) != 1 for sign in self.branch):
@@ -69,3 +75,13 @@ class RotaryArms:
                     f"rotary.axis_x[{i}], axis_y[{i}]: expected two unit vectors at right "
                     f"angles, found {x.tolist()} and {y.tolist()}"
                 )
+
+
+def _orthonormal(x: Array, y: Array) -> tuple[Array, Array]:
+    """Axes (6, 3) of unit length and at right angles to rounding; those that are stay unchanged."""
+    off = [np.sum(x * x, axis=-1) - 1, np.sum(y * y, axis=-1) - 1, np.sum(x * y, axis=-1)]
+    inexact = np.abs(off).max(axis=0)[:, None] > EXACT
+    unit = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    upright = y - np.sum(unit * y, axis=-1, keepdims=True) * unit
+    upright /= np.linalg.norm(upright, axis=-1, keepdims=True)
+    return np.where(inexact, unit, x), np.where(inexact, upright, y)

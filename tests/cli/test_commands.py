@@ -149,6 +149,17 @@ def test_version(gough):
         (["solve", "x.csv", "-p", "reference", "--angels", "deg"], "--angles"),
         (["solve", "x.csv", "-p", "reference", "--angles", "grad"], "grad"),
         (["solve", "x.csv", "-p", "reference", "--block-rows", "0"], "block_rows"),
+        (["solve", str(EXAMPLE), "-p", "rubin_camera", "--head", "-3"], "head: expected 0 or more"),
+        (
+            ["solve", str(EXAMPLE), "-p", "rubin_camera", "--block-rows", "9" * 20],
+            "block_rows: expected 1 to 1,000,000,000, found 1e+20",
+        ),
+        (
+            ["solve", str(EXAMPLE), "-p", "rubin_camera", "--columns", "1:1000000000"],
+            "columns: expected six different columns, found (1, 2, 3, 4, 5, 6, 7)",
+        ),
+        (["solve", str(EXAMPLE), "-p", "rubin_camera", "--columns", "1" * 5000], "columns"),
+        (["solve", str(EXAMPLE), "-p", "rubin_camera", "--seed", "polynomial-" + "1" * 5000], "e"),
         (["solve", "x.csv", "-p", "referense"], "did you mean 'reference'"),
         (["solve", "x.doc", "-p", "reference"], "must end in .csv or .parquet"),
         (["solve", "none.csv", "-p", "reference"], "none.csv: cannot be read: No such file"),
@@ -189,3 +200,28 @@ def test_names_with_spaces_and_standard_streams(tmp_path):
     )  # fmt: skip
     assert piped.code == 0
     assert pq.read_metadata(tmp_path / "legs out.parquet").num_rows == 1000
+
+
+def test_poses_too_far_to_calculate_with_have_no_readings_and_no_warning(gough, tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text("x,y,z,rx,ry,rz\n1e308,-1e308,1e308,0,0,0\n0,0,1e200,0,0,0\n")
+    code, out, err = gough("inverse", path, "-p", "reference")
+    assert (code, err) == (1, "")
+    assert "unreachable" in out
+
+
+def test_control_characters_of_files_do_not_reach_the_terminal(gough, tmp_path):
+    machine, log = tmp_path / "red.toml", tmp_path / "legs.csv"
+    text = library.Platform.load("reference").to_toml()
+    for field in ("name", "unit"):
+        machine.write_text(
+            re.sub(rf"^{field} = .*", rf'{field} = "\\u001b[31mred"', text, flags=re.M)
+        )
+        code, _, err = gough("platforms", machine)
+        assert code == 2
+        assert f"{field}: expected text that prints" in err
+        assert "\x1b" not in err
+    log.write_text(",".join(f"\x1b[31m_{k}" for k in range(6)) + "\n1,2,3,4,5,6\n")
+    code, _, err = gough("solve", log, "-p", "reference")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "\x1b" not in err

@@ -91,6 +91,25 @@ def test_a_full_disk_behind_standard_output(arguments):
     assert "disk is full" in done.stderr or "No space left" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("solve - -p rubin_camera >&-", "Bad file descriptor"),
+        ("solve - -p rubin_camera -o - >&-", "standard output: cannot be written"),
+        ("solve - -p rubin_camera <&-", "standard input: is empty"),
+    ],
+)
+def test_closed_streams(command, words):
+    with EXAMPLE.open() as legs:
+        done = subprocess.run(
+            f"{sys.executable} -m gough.cli {command}", shell=True, check=False, text=True,
+            stdin=legs, stderr=subprocess.PIPE,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert words in done.stderr
+
+
 def test_a_reader_that_leaves_is_met_with_silence(many):
     running = start("inverse", *poses(many), "-o", "-", *SLOW)
     assert running.stdout is not None

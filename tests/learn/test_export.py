@@ -16,8 +16,8 @@ from learn.networks import network, reference, tiny, with_model
 from gough import GoughError, Platform, leg_lengths
 from gough.learn.export import export_run, network_facts, to_onnx
 from gough.learn.models import MODELS
-from gough.learn.run_folder import WEIGHTS, load_tensors, save_tensors
-from gough.seeds.network import NetworkSeed, seal
+from gough.learn.run_folder import WEIGHTS, load_state, load_tensors, save_tensors
+from gough.seeds.network import NetworkSeed, _unseal, seal
 
 RECORD = {"seconds": 1.0, "steps": 20, "seed": 0}
 SIZES = {
@@ -128,6 +128,43 @@ def test_other_files_are_refused(run, tmp_path):
         load_tensors(truncated)
     save_tensors(truncated, {}, {"format": 0})
     assert load_tensors(truncated) == ({}, {"format": 0})
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'"rotation"', b'"rotatiom"'),
+        (b'"nine"', b'"none"'),
+        (b'"quaternion"', b'"quaternium"'),
+        (b'"shift_mean": [', b'"shift_mean": {'),
+        (b'"leg_range"', b'"leg_rangf"'),
+        (b'"platform_name"', b'"platform_namf"'),
+    ],
+)
+def test_a_network_with_other_facts_is_of_another_format(run, tmp_path, old, new):
+    content = _unseal((run / "network.onnx").read_bytes(), "network")
+    if old in content:
+        path = tmp_path / "network.onnx"
+        path.write_bytes(seal(content.replace(old, new)))
+        with pytest.raises(GoughError, match="a network of another format"):
+            NetworkSeed(reference(), path)
+
+
+def test_a_checkpoint_with_other_parts_is_refused_in_one_line(tmp_path):
+    path, model = tmp_path / "checkpoint.safetensors", torch.nn.Linear(3, 2)
+    optimiser = torch.optim.Adam(model.parameters())
+    weights = {f"model/{k}": v for k, v in model.state_dict().items()}
+    for tensors, facts in (
+        ({}, {"numbers": {}}),
+        (weights | {"modle/bias": torch.ones(2)}, {"numbers": {}}),
+        (weights, {}),
+        (weights, {"numbers": {"x": {}}}),
+        (weights | {"optimiser/x/step": torch.ones(2)}, {"numbers": {}}),
+    ):
+        save_tensors(path, tensors, facts)
+        with pytest.raises(GoughError, match="checkpoint") as error:
+            load_state(path, model, {}, optimiser)
+        assert "\n" not in str(error.value)
 
 
 def length_and(text: str) -> bytes:

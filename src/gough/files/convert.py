@@ -148,8 +148,7 @@ def inverse_file(
         for block in job.blocks:
             pose, fault = poses_from_columns(block.numbers(job.numbers), job.numbers)
             pose = pose if view is None else view.platform_pose(pose)
-            with np.errstate(invalid="ignore"):
-                legs = leg_lengths(platform, pose)
+            legs = leg_lengths(platform, pose)
             status = pose_status(platform, pose, legs)
             report.add(pose, legs, status)
             report.describe_invalid(block, status == InverseStatus.INVALID_INPUT, fault)

@@ -211,16 +211,19 @@ def _parsed(name: str, value: Any) -> Any:
     if not isinstance(value, str):
         return tuple(value) if isinstance(value, list) else value
     parts = [part.strip() for part in value.split(",") if part.strip()]
+    number = re.compile(r"\d{1,6}", re.ASCII)  # of a column
     try:
         if name != "columns":
             numbers = tuple(map(float, parts))
             return numbers[0] if len(numbers) == 1 else numbers
-        if found := re.fullmatch(r"(\d+):(\d+)", value.strip()):
-            return tuple(range(int(found[1]), int(found[2]) + 1))
+        ends = value.split(":")
+        if len(ends) == 2 and all(end.strip().isdecimal() for end in ends):
+            first, last = map(int, ends)
+            return tuple(range(first, min(last, first + 6) + 1))  # six are expected
         if all("=" in part for part in parts):
             pairs = {leg.strip(): column for column, _, leg in (p.rpartition("=") for p in parts)}
             parts = [pairs[str(leg)].strip() for leg in range(1, 7)]
     except (ValueError, KeyError):
         wanted = "1:6, six names in order, or NAME=LEG,..." if name == "columns" else "numbers"
         raise InputError(f"--{name} {value}: expected {wanted}") from None
-    return tuple(int(part) if part.isdigit() else part for part in parts)
+    return tuple(int(part) if number.fullmatch(part) else part for part in parts)

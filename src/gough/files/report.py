@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.errors import GoughError
 from gough.files.rows import Block
 from gough.pose import Pose
 from gough.status import Outcome
@@ -46,6 +47,8 @@ class Report:
     preparing: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.head < 0:
+            raise GoughError(f"head: expected 0 or more rows, found {self.head}")
         self.counts = np.zeros(len(self.outcomes), np.int64)
         self.worst = np.full(len(self.outcomes), np.nan)
         self._start = time.perf_counter()

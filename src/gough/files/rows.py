@@ -17,6 +17,7 @@ from gough.tables import arrow_values
 
 # text that stands for "no value" in a number column
 MISSING = ("", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
+MOST_ROWS = 1_000_000_000  # in a block
 Conversions = dict[str, tuple[float, float]]
 
 
@@ -40,8 +41,9 @@ class Reading:
     log: LogFormat = field(default_factory=LogFormat)
 
     def __post_init__(self) -> None:
-        if self.block_rows < 1:
-            raise GoughError(f"block_rows: expected 1 or more, found {self.block_rows}")
+        if not 1 <= self.block_rows <= MOST_ROWS:
+            found = f"{self.block_rows:.6g}"
+            raise GoughError(f"block_rows: expected 1 to {MOST_ROWS:,}, found {found}")
 
 
 @dataclass(frozen=True)

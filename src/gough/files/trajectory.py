@@ -120,8 +120,7 @@ class TrajectoryFile:
             )  # fmt: skip
         pose, _ = poses_from_columns(values, self.columns)
         pose = pose if self.frame is None else self.frame.platform_pose(pose)
-        with np.errstate(invalid="ignore"):
-            legs = leg_lengths(self.platform, pose)
+        legs = leg_lengths(self.platform, pose)
         stated = rows[:, 2].astype(np.int64)
         outcomes = [
             InverseStatus(code) if one < 0 else Status(one)

@@ -69,11 +69,11 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
     """
     try:
         with safe_open(path, framework="pt") as file:
-            facts = json.loads((file.metadata() or {})["gough"])
+            facts = dict(json.loads((file.metadata() or {})["gough"]))
             return {name: file.get_tensor(name) for name in file.keys()}, facts  # noqa: SIM118
     except FileNotFoundError:
         raise GoughError(f"{path}: no such file") from None
-    except (SafetensorError, OSError, KeyError, json.JSONDecodeError) as error:
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
         raise GoughError(f"{path}: truncated, corrupt, or not written by gough: {error}") from None
 
 
@@ -101,19 +101,24 @@ def load_state(path: Path, model: nn.Module, average: dict[str, Tensor],
     """
     tensors, facts = load_tensors(path)
     parts: dict[str, dict[str, Tensor]] = {"model": {}, "average": {}, "optimiser": {}}
-    for name, tensor in tensors.items():
-        part, _, key = name.partition("/")
-        parts[part][key] = tensor
-    load_weights(path, model, parts["model"])
-    for key, value in average.items():
-        value.copy_(parts["average"][key])
-    state: dict[int, dict] = {int(i): dict(n) for i, n in facts["numbers"].items()}
-    for name, tensor in parts["optimiser"].items():
-        index, _, key = name.partition("/")
-        state.setdefault(int(index), {})[key] = tensor
-    groups = optimiser.state_dict()["param_groups"]
-    with torch.no_grad():
-        optimiser.load_state_dict({"state": state, "param_groups": groups})
+    try:
+        for name, tensor in tensors.items():
+            part, _, key = name.partition("/")
+            parts[part][key] = tensor
+        load_weights(path, model, parts["model"])
+        for key, value in average.items():
+            value.copy_(parts["average"][key])
+        state: dict[int, dict] = {int(i): dict(n) for i, n in facts["numbers"].items()}
+        for name, tensor in parts["optimiser"].items():
+            index, _, key = name.partition("/")
+            state.setdefault(int(index), {})[key] = tensor
+        groups = optimiser.state_dict()["param_groups"]
+        with torch.no_grad():
+            optimiser.load_state_dict({"state": state, "param_groups": groups})
+    except (AttributeError, KeyError, RuntimeError, TypeError, ValueError) as error:
+        if isinstance(error, GoughError):
+            raise
+        raise GoughError(f"{path}: not a checkpoint of this run: {_one_line(error)}") from None
     return facts
 
 
@@ -126,7 +131,11 @@ def load_weights(path: Path, model: nn.Module, weights: dict[str, Tensor]) -> No
     try:
         model.load_state_dict(weights)
     except RuntimeError as error:
-        raise GoughError(f"{path}: of another network: {error}") from None
+        raise GoughError(f"{path}: of another network: {_one_line(error)}") from None
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 # ---- measurements -------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -122,10 +123,10 @@ def _named(platform: Platform, name: str) -> Seed:
         return _polynomial(platform, DEGREE if platform.workspace else 0)
     if name == "home":
         return _polynomial(platform, 0)
-    if kind == "polynomial" and (degree == "" or degree.isdecimal()):
+    if kind in ("polynomial", "taylor") and re.fullmatch(r"[0-9]{0,3}", degree):
+        if kind == "taylor":
+            return TaylorSeed(platform, int(degree or 2))
         return _polynomial(platform, int(degree or DEGREE))
-    if kind == "taylor" and (degree == "" or degree.isdecimal()):
-        return TaylorSeed(platform, int(degree or 2))
     if name == "universal":
         return _universal(platform)
     return _network(platform, name)

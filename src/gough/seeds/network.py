@@ -11,7 +11,7 @@ import hashlib
 import json
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 NETWORK = "network.onnx"
+KEYS = {"kind", "platform", "platform_name", "unit"}  # which the facts of all networks have
+OTHER_FORMAT = "a network of another format; train again with this version"
+WIDTHS = {"quaternion": 7, "nine": 12, "euler": 6}  # numbers of an output, by form of the rotation
 CHUNK = 1024  # rows evaluated at a time: more take memory, and no less time
 _KEY = b"gough.sha256"
 _ENTRY = len(_KEY) + 64 + 4
@@ -78,10 +81,22 @@ class NetworkSeed:
     def _open(self, platform: Platform, content: bytes, where: str, threads: int) -> None:
         self.facts = read_facts(content, where)
         _check_platform(platform, self.facts, where)
-        self._session = session(content, where, threads)
-        self.name = self.facts["kind"]
-        self.leg_range: Array = np.array(self.facts["leg_range"])
-        self._platform = platform
+        self._session, self._where = session(content, where, threads), where
+        self.name, self._platform = self.facts["kind"], platform
+        try:
+            self._rotation = self.facts["rotation"]
+            width = WIDTHS[self._rotation]
+            self.leg_range: Array = _numbers(self.facts, "leg_range", (6, 2))
+            scaling = self.facts["scaling"]
+            self._mean, self._scale, self._turn = (
+                _numbers(scaling, name, (3,))
+                for name in ("shift_mean", "shift_scale", "turn_scale")
+            )
+        except (GoughError, KeyError, TypeError) as error:
+            raise GoughError(f"{where}: {OTHER_FORMAT} ({error})") from None
+        found = [put.shape for put in self._session.get_outputs()]
+        if len(found) != 1 or len(found[0]) != 2 or found[0][1] != width:
+            raise GoughError(f"{where}: {OTHER_FORMAT} (outputs {found}, expected {width} numbers)")
 
     def guess(self, legs: Array) -> Pose:
         """Poses (N,) for readings (N, 6), finite for finite readings.
@@ -97,9 +112,8 @@ class NetworkSeed:
         legs = as_batch("legs", legs, (6,))
         flat = np.clip(legs.reshape(-1, 6), *self.leg_range.T)
         parts = [flat[i : i + CHUNK] for i in range(0, len(flat), CHUNK)]
-        raw = [np.asarray(self._session.run(None, {"legs": part})[0]) for part in parts]
-        width = self._session.get_outputs()[0].shape[1]
-        outputs = np.concatenate([*raw, np.zeros((0, width))])
+        raw = [run(self._session, self._where, {"legs": part})[0] for part in parts]
+        outputs = np.concatenate([*raw, np.zeros((0, WIDTHS[self._rotation]))])
         return self._decode(outputs.reshape(*legs.shape[:-1], outputs.shape[-1]))
 
     def outside(self, legs: Array) -> NDArray[np.bool_]:
@@ -109,13 +123,13 @@ class NetworkSeed:
 
     def _decode(self, raw: Array) -> Pose:
         """Raw numbers (..., 7, 12 or 6) to poses; see `gough.learn.models.base.PoseNetwork`."""
-        scaling, home = self.facts["scaling"], self._platform.home
-        shift = np.array(scaling["shift_mean"]) + np.array(scaling["shift_scale"]) * raw[..., :3]
+        home = self._platform.home
+        shift = self._mean + self._scale * raw[..., :3]
         rest = raw[..., 3:]
-        if self.facts["rotation"] == "quaternion":
+        if self._rotation == "quaternion":
             turn = rest
-        elif self.facts["rotation"] == "euler":
-            turn = Pose.from_euler(shift, np.array(scaling["turn_scale"]) * rest).wxyz
+        elif self._rotation == "euler":
+            turn = Pose.from_euler(shift, self._turn * rest).wxyz
         else:
             matrices = nearest_rotations(rest.reshape(*rest.shape[:-1], 3, 3))
             turn = Pose.from_rotation(shift, matrices).wxyz
@@ -194,9 +208,22 @@ def _facts(body: bytes, where: str) -> dict:
         facts = json.loads(body[start : start + size])
     except (IndexError, ValueError):
         facts = {}
-    if at < 0 or facts.get("format") != FORMAT:
-        raise GoughError(f"{where}: a network of another format; train again with this version")
+    facts = facts if at >= 0 and isinstance(facts, dict) else {}
+    if facts.get("format") != FORMAT or not facts.keys() >= KEYS:
+        raise GoughError(f"{where}: {OTHER_FORMAT}")
     return facts
+
+
+def _numbers(facts: dict, name: str, shape: tuple[int, ...]) -> Array:
+    """Finite numbers of a network's facts.
+
+    Raises:
+        GoughError: others.
+    """
+    values = as_batch(name, facts[name], shape)
+    if values.shape != shape or not np.all(np.isfinite(values)):
+        raise GoughError(f"{name}: expected {shape} finite numbers")
+    return values
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
@@ -275,6 +302,19 @@ def _shipped(platform: Platform) -> list[tuple[str, dict]]:
         if facts["platform"] == platform.digest:
             out.append((file.name, facts))
     return out
+
+
+def run(session: Any, where: str, inputs: dict[str, Array]) -> list[Array]:
+    """Evaluate a network.
+
+    Raises:
+        GoughError: it does not take these inputs.
+    """
+    try:
+        return session.run(None, inputs)
+    except Exception as error:  # onnxruntime's exceptions have no common base but this
+        reason = str(error).splitlines()[0]
+        raise GoughError(f"{where}: onnxruntime cannot run this network: {reason}") from None
 
 
 def session(content: bytes, where: str, threads: int):

@@ -23,7 +23,7 @@ from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.seeds.damped import FAR, Polished, polish, strut_errors
-from gough.seeds.network import NETWORK, read, read_facts, session
+from gough.seeds.network import NETWORK, read, read_facts, run, session
 from gough.seeds.taylor import HomeStruts, cross, gibbs_quaternion, series
 
 KIND, FILE = "universal", "universal.onnx"
@@ -66,6 +66,7 @@ class UniversalSeed:
                  polished: bool = True
                  ) -> None:  # fmt: skip
         self.platform, self._polished = platform, polished
+        self._where = FILE if path is None else str(path)
         self._session, self.facts = _open(platform, path, threads)
 
     def guess(self, legs: Array) -> Pose:
@@ -131,7 +132,7 @@ class UniversalSeed:
                 "base": struts.base[some], "joints": struts.joints[some],
                 "inverse": struts.inverse[some], "terms": np.ascontiguousarray(terms[:, some]),
             }  # fmt: skip
-            parts.append(self._session.run(None, given)[0])
+            parts.append(run(self._session, self._where, given)[0])
         return np.concatenate(parts)
 
 

@@ -109,8 +109,7 @@ class Model:
     def ask_pose(self, pose: Pose) -> None:
         """Go to a pose; the legs follow by inverse kinematics."""
         begin = time.perf_counter()
-        with np.errstate(invalid="ignore"):
-            legs = leg_lengths(self.platform, pose)
+        legs = leg_lengths(self.platform, pose)
         seconds = time.perf_counter() - begin
         problem = _problem(self.platform, pose, legs)
         if not problem:

@@ -8,7 +8,7 @@ import torch
 
 from gough.errors import GoughError
 from gough.learn.export import finish_onnx, quiet
-from gough.learn.run_folder import NETWORK, WEIGHTS, load_tensors, save_tensors
+from gough.learn.run_folder import NETWORK, WEIGHTS, load_tensors, load_weights, save_tensors
 from gough.learn.universal.network import Universal
 from gough.platform import Platform
 from gough.seeds.network import FORMAT
@@ -59,6 +59,9 @@ def load(path: Path) -> tuple[Universal, dict]:
     tensors, facts = load_tensors(path / WEIGHTS if path.is_dir() else path)
     if facts.get("kind") != KIND or facts.get("format") != FORMAT:
         raise GoughError(f"{path}: not a universal network of this version")
-    model = Universal(**facts["network"])
-    model.load_state_dict(tensors)
+    try:
+        model = Universal(**facts["network"])
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise GoughError(f"{path}: not a universal network of this version: {error}") from None
+    load_weights(path, model, tensors)
     return model, facts

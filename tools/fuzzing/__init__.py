@@ -1,0 +1,1 @@
+"""Damaged and hostile inputs for gough, and an independent judge of its answers."""
