@@ -48,7 +48,7 @@ def random_platform(seed: int, legs: str = "telescopic", sensors: bool = False) 
         size * base,
         size * moving,
         home,
-        unit=str(rng.choice(["mm", "m", "", 'the "foot"\n\x7f'])),
+        unit=str(rng.choice(["mm", "m", "", 'the "foot" \\ é'])),
         name=f"random {seed}",
         legs=legs,  # pyright: ignore[reportArgumentType]
         pivot=size * rng.uniform(-0.2, 0.2, 3) if rng.random() < 0.5 else None,

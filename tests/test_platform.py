@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gough import GoughError, Platform, PlatformError, Pose, RotaryArms, Workspace, leg_lengths
+from gough.errors import CONTROL
 from gough.platform_file import catalog_text, from_toml
 
 CATALOG = Platform.catalog()
@@ -60,6 +61,11 @@ def test_any_platform_survives_its_own_toml(platform: Platform) -> None:
 
 @given(st.text(), st.text())
 def test_any_name_and_unit_survive_toml(name: str, unit: str) -> None:
+    """All but those with control characters, which are refused."""
+    if CONTROL.search(name + unit):
+        with pytest.raises(PlatformError, match="holds control characters"):
+            replace(REFERENCE, name=name, unit=unit)
+        return
     platform = replace(REFERENCE, name=name, unit=unit)
     assert from_toml(platform.to_toml()) == platform
 

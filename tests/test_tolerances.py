@@ -16,7 +16,7 @@ import gough
 from gough import GoughError, Platform, PlatformError, Pose
 from gough.checks import LARGEST
 from gough.modes.choose import BRANCH_SLACK
-from gough.platform_checks import COINCIDENT
+from gough.platform_checks import COINCIDENT, FARTHEST
 from gough.pose import ROTATION, UNIT_LENGTH
 from gough.rotary import RIGHT_ANGLE
 
@@ -51,6 +51,28 @@ def test_joints_closer_than_the_tolerance_are_one_point(scale: float) -> None:
     machine(3 * COINCIDENT)
     with pytest.raises(PlatformError, match="share both joints"):
         machine(COINCIDENT / 3)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("field", ["base", "moving", "pivot", "home"])
+def test_machines_too_far_from_the_origin_are_refused(field: str, scale: float) -> None:
+    def machine(sizes: float) -> Platform:
+        far = np.array([0, sizes * scale * REFERENCE.size, 0])
+        parts = {
+            "base": scale * REFERENCE.base,
+            "moving": scale * REFERENCE.moving,
+            "pivot": np.zeros(3),
+            "home": scale * REFERENCE.home.position,
+        }
+        moved = {"base": ("base", "home"), "home": ("base", "home"), "moving": ("moving", "home")}
+        for name in moved.get(field, ("pivot",)):
+            sign = -1 if (field, name) == ("moving", "home") else 1
+            parts[name] = parts[name] + sign * far
+        return Platform(parts["base"], parts["moving"], parts["home"], pivot=parts["pivot"])
+
+    machine(FARTHEST / 2)
+    with pytest.raises(PlatformError, match="leaves too few digits"):
+        machine(2 * FARTHEST)
 
 
 def test_arm_axes_may_be_off_by_the_tolerance_only() -> None:

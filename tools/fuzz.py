@@ -73,7 +73,7 @@ def _try(name: str, number: int, target, tally: Tally) -> None:
         outcome = f"TRACEBACK {traceback.format_exc(limit=-6)}"
     took = time.monotonic() - begin
     tally.seconds += took
-    if took > PATIENCE:
+    if took > PATIENCE and tally.counts:  # the first input compiles
         outcome = f"WRONG: took {took:.0f} s"
     kind = outcome.partition(" ")[0].rstrip(":")
     tally.counts[kind] += 1

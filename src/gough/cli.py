@@ -13,7 +13,7 @@ from importlib import import_module
 
 import gough
 from gough.commands import COMMANDS, help_text, signals
-from gough.errors import GoughError, suggestion
+from gough.errors import GoughError, printable, suggestion
 
 BAD_USAGE, BROKEN_PIPE = 2, 141
 Functions = Callable[..., int] | dict[str, Callable[..., int]]  # dict: a family of commands
@@ -131,7 +131,7 @@ def _parse(program: str, functions: Functions, arguments: list[str]) -> int:
 def _print_error(text: str) -> int:
     """Print one line on standard error, which may be closed, and return the exit code."""
     with suppress(OSError):
-        print(_printable(text), file=sys.stderr, flush=True)
+        print(printable(text), file=sys.stderr, flush=True)
     return BAD_USAGE
 
 
@@ -139,12 +139,7 @@ class _Printable(logging.Formatter):
     """Notes without control characters."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return _printable(super().format(record))
-
-
-def _printable(text: str) -> str:
-    """Text with escapes in place of control characters, which files may have put into it."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        return printable(super().format(record))
 
 
 def _prepare_streams() -> None:

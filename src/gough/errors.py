@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+
+# control characters, line separators, marks that change the direction of text, lone surrogates
+CONTROL = re.compile(
+    "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
 
 
 class GoughError(ValueError):
@@ -23,3 +29,8 @@ def suggestion(name: str, choices: Iterable[str]) -> str:
 
     near = get_close_matches(name, list(choices), n=1)
     return f"; did you mean {near[0]!r}?" if near else ";"
+
+
+def printable(text: str) -> str:
+    """Text with escapes in place of control characters, which files may have put into it."""
+    return CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)

@@ -98,9 +98,7 @@ class Platform:
         frames: Frames | None = None,
         limits: MachineLimits | None = None,
     ) -> None:
-        for field, text in (("unit", unit), ("name", name)):
-            if not isinstance(text, str):
-                raise PlatformError(f"{field}: expected text, found {text!r}")
+        platform_checks.check_text(unit=unit, name=name)
         platform_checks.check_parts(legs, workspace, rotary, frames, limits)
         fields = {
             "base": platform_checks.joints("base", base),
@@ -120,6 +118,10 @@ class Platform:
         for field, value in fields.items():
             object.__setattr__(self, field, value)
         at_home = self._moving_at_home()
+        platform_checks.check_near_origin(
+            self.size, base=self.base, moving=self.moving, pivot=self.pivot_point,
+            home=self.home.position,
+        )  # fmt: skip
         platform_checks.check_joints(self.base, self.moving, at_home, self.size, rotary is None)
         ends = platform_checks.stroke_limits(stroke, legs, self.home_legs)
         object.__setattr__(self, "stroke", ends)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gough.checks import Array, frozen, platform_field, platform_numbers
-from gough.errors import PlatformError
+from gough.errors import CONTROL, PlatformError
 from gough.frames import Frames
 from gough.machine_limits import MachineLimits
 from gough.pose import Pose
@@ -18,6 +18,16 @@ from gough.workspace import Workspace
 
 LegKind = Literal["telescopic", "length_change", "rotary"]
 COINCIDENT = 1e-9  # joints closer than this share of the platform's size are one point
+FARTHEST = 1e7  # [platform size] from the origin, beyond which coordinates have too few digits
+
+
+def check_text(**fields: object) -> None:
+    """Raise unless all values are text that can be printed in a terminal."""
+    for name, text in fields.items():
+        if not isinstance(text, str):
+            raise PlatformError(f"{name}: expected text, found {text!r}")
+        if CONTROL.search(text):
+            raise PlatformError(f"{name}: holds control characters: {text!r}")
 
 
 def check_parts(
@@ -62,6 +72,17 @@ def home_pose(value: Pose | ArrayLike) -> Pose:
         platform_field("home.position", pose.position, (3,)),
         platform_field("home.wxyz", pose.wxyz, (4,)),
     )
+
+
+def check_near_origin(size: float, **points: Array) -> None:
+    """Raise if points are so far from the origin that rounding is felt at the platform's size."""
+    for name, value in points.items():
+        away = float(np.abs(value).max())
+        if away > FARTHEST * size:
+            raise PlatformError(
+                f"{name}: {away:.3g} is {away / size:.1g} times the machine's size {size:.3g}, "
+                "which leaves too few digits; state coordinates from an origin near the machine"
+            )
 
 
 def check_joints(base: Array, moving: Array, at_home: Array, size: float, struts: bool) -> None:

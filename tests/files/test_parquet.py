@@ -108,3 +108,15 @@ def test_rows_are_named_by_number(legs_parquet):
     first, second, *_ = blocks(legs_parquet, 30)
     assert first.place(0) == "row 1"
     assert second.place(4) == "row 35"
+
+
+def test_names_that_are_no_text_are_damage(tmp_path):
+    path = tmp_path / "legs.parquet"
+    table = pa.table({"leg_1": [1.0]}).replace_schema_metadata({"note": "x"})
+    pq.write_table(table, path)
+    content = path.read_bytes()
+    for name in (b"leg_1", b"note"):
+        assert name in content
+        path.write_bytes(content.replace(name, b"\xff" + name[1:]))
+        with pytest.raises(InputError, match="cut off or damaged"):
+            open_source(path)

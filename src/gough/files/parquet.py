@@ -39,14 +39,14 @@ class ParquetSource:
                 buffer_size=PAGE_BUFFER,
                 page_checksum_verification=True,
             )
-        except (pa.ArrowException, OSError) as error:
+            raw = self._file.metadata.metadata or {}
+            self.metadata = {k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()}
+        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise InputError(f"{where}: {_not_parquet(file, error)}") from None
         self._schema = self._file.schema_arrow
         self.columns: list[str] = list(self._schema.names)
         self.units, self.conversions = [""] * len(self.columns), {}
         self._stored = {name: name for name in self.columns}  # names in the file
-        raw = self._file.metadata.metadata or {}
-        self.metadata = {k.decode(): v.decode("utf-8", "replace") for k, v in raw.items()}
         self.total: int | None = self._file.metadata.num_rows
         if not self.total:
             raise InputError(f"{where}: holds no rows; expected a row per pose")
