@@ -109,7 +109,8 @@ def pose_status(platform: Platform, pose: Pose, legs: Array) -> NDArray[np.uint8
     status = np.full(pose.batch, InverseStatus.OK, np.uint8)
     status[~in_workspace(platform, pose)] = InverseStatus.OUTSIDE_WORKSPACE
     status[~in_stroke(platform, legs)] = InverseStatus.OUTSIDE_STROKE
-    status[~in_home_mode(platform, pose)] = InverseStatus.OTHER_MODE
+    with np.errstate(over="ignore", invalid="ignore"):  # poses far beyond reach
+        status[~in_home_mode(platform, pose)] = InverseStatus.OTHER_MODE
     status[~np.all(np.isfinite(legs), axis=-1)] = InverseStatus.UNREACHABLE
     status[np.isnan(pose.position[..., 0])] = InverseStatus.INVALID_INPUT
     return status
