@@ -15,6 +15,7 @@ EULER_DEG = ("rx_deg", "ry_deg", "rz_deg")
 ROTATIONS = (QUATERNION, EULER, EULER_DEG)
 ROTATION_TEXT = "qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg"
 STATUS, RESIDUAL, ITERATIONS, RADIUS = "status", "residual", "iterations", "radius"
+EVENT = "event"
 DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
 Angles = Literal["deg", "rad"]
 
@@ -112,9 +113,11 @@ def deviation_names(angles: Angles | None) -> tuple[str, ...]:
     return DEVIATIONS[:3] + tuple(name + ending for name in DEVIATIONS[3:])
 
 
-def solution_names(angles: Angles | None, covariance: bool, radius: bool) -> tuple[str, ...]:
+def solution_names(
+    angles: Angles | None, covariance: bool, radius: bool, event: bool = False
+) -> tuple[str, ...]:
     """The columns of solved rows in files and tables."""
-    optional = deviation_names(angles) * covariance + (RADIUS,) * radius
+    optional = deviation_names(angles) * covariance + (RADIUS,) * radius + (EVENT,) * event
     return (*pose_names(angles), STATUS, RESIDUAL, ITERATIONS, *optional)
 
 

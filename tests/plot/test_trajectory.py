@@ -112,7 +112,7 @@ def test_unusable_statuses_of_a_solved_file_count_as_no_answer(tmp_path):
     pose = platform.sample_poses(4, seed=2)
     values = np.concatenate([pose.position, pose.euler], axis=1)
     columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), values.T, strict=True))
-    words = ["converged", "outside_workspace", "near_singularity", "unreachable"]
+    words = ["converged", "other_mode", "near_singularity", "unreachable"]
     pq.write_table(pa.table(columns | {"status": words}), tmp_path / "a.parquet")
     envelope = read_trajectory(tmp_path / "a.parquet", platform)
     assert envelope.missing.tolist() == [0, 1, 0, 1]

@@ -56,8 +56,18 @@ def report_facts(report: Report, platform: Platform, rows: list[dict]) -> dict:
         "seconds": report.seconds,
         "statuses": statuses,
         "invalid": report.invalid,
+        "unlikely": report.unlikely,
+        "events": _events(report),
         "first_rows": rows,
     }
+
+
+def _events(report: Report) -> dict | None:
+    from gough.status import Event
+
+    if report.events is None:
+        return None
+    return {event.label: report.events[event] for event in Event if report.events[event]}
 
 
 def first_poses(report: Report, angles: Angles | None) -> list[dict]:

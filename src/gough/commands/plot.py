@@ -160,7 +160,7 @@ def trajectory(
         file: Read poses or readings from this file, .csv, .txt, .tsv or .parquet, or from standard
             input (-).
         time: Draw over this column, in seconds unless its name ends in a unit, as in time_ms;
-            without it over the numbers of the rows.
+            without it over the time of the platform file's [readings], or the numbers of rows.
         seed: Start from this first guess, as in gough solve.
     """
     from gough.plot.trajectory import note, read_trajectory, trajectory_figure
@@ -169,7 +169,7 @@ def trajectory(
     envelope = read_trajectory(
         file, machine, time=time, seed=seed, reading=reading.of(platform), tick=_check_signals
     )
-    figure = trajectory_figure(machine, envelope, time=time or "row",
+    figure = trajectory_figure(machine, envelope, time=envelope.time,
                                title=f"{machine.name}: {_name(file)}")  # fmt: skip
     code = _save(figure, machine, out, "trajectory")
     said = note(envelope).replace("\N{MULTIPLICATION SIGN} ", "")

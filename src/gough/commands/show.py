@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gough.files.rows import Source
     from gough.platform import Platform
 
+WIDTH = 80  # columns that tables of poses fit in
 NOTICEABLE = 2.0  # [s] of compiling that are reported
 STANDARD = "-"  # as in gough.files, whose import takes too long for a help text
 # one rule, below the head
@@ -94,6 +95,28 @@ def print_summary(report: Report, platform: Platform, out: str | None, screen: C
     screen.print(table)
     for i in found:
         screen.print(f"{report.outcomes[i].label}: {report.outcomes[i].text}", markup=False)
+    print_events(report, screen)
+
+
+def print_events(report: Report, screen: Console) -> None:
+    """Print the rows of each event; where rows were not followed but have times, suggest it."""
+    from gough.status import Event
+
+    if report.events is not None:
+        table = plain_table("event", ">rows", ">share")
+        shown = [event for event in Event if report.events[event]]
+        for event in shown:
+            share = 100 * report.events[event] / report.rows
+            table.add_row(event.label, f"{report.events[event]:,}", f"{share:.1f} %")
+        screen.print(table)
+        for event in shown:
+            screen.print(f"{event.label}: {event.text}", markup=False)
+    elif report.time and report.rows > 1:
+        screen.print(
+            f"The file has times ({report.time}). If its rows follow each other, --follow starts "
+            "each at the pose before and marks jumps.",
+            markup=False,
+        )
 
 
 def _share(report: Report, i: int) -> str:
@@ -107,7 +130,7 @@ def _share(report: Report, i: int) -> str:
 def print_invalid(report: Report, where: str) -> None:
     """Print the first invalid rows and the number of others, on standard error."""
     screen = console(errors=True)
-    for text in report.invalid:
+    for text in report.invalid + report.unlikely:
         screen.print(f"{where}: {text}", markup=False, soft_wrap=True)
     invalid = next(
         int(n)
@@ -126,13 +149,38 @@ def print_poses(report: Report, platform: Platform, screen: Console) -> None:
     if report.frame:
         screen.print(f"poses of {report.frame}", markup=False)
     table = plain_table(*heads, ">rx_deg", ">ry_deg", ">rz_deg", "status")
-    places = _decimals(platform.size)
-    angles = np.degrees(report.pose.euler)
-    for i, status in enumerate(report.status):
-        numbers = [f"{v:.{places}f}" for v in report.pose.position[i]]
-        numbers += [f"{v:.5f}" for v in angles[i]]
-        table.add_row(*numbers, report.outcomes[status].label)
+    for row in _fitting_rows(report, _decimals(platform.size)):
+        table.add_row(*row)
     screen.print(table)
+
+
+def _fitting_rows(report: Report, places: int) -> list[list[str]]:
+    """The first poses and their statuses, with as many digits as leave room for the statuses."""
+    angles = np.degrees(report.pose.euler)
+    labels = _labels(report)
+    for drop in range(places + 1):
+        rows = [
+            [f"{v:.{places - drop}f}" for v in position]
+            + [f"{v:.{max(5 - drop, 2)}f}" for v in turn]
+            + [label]
+            for position, turn, label in zip(report.pose.position, angles, labels, strict=True)
+        ]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        if sum(max(width, 6) + 1 for width in widths) <= WIDTH:
+            break
+    return rows
+
+
+def _labels(report: Report) -> list[str]:
+    """The status of each of the first rows, or the event for which its pose was not taken."""
+    from gough.status import Event
+
+    labels = [report.outcomes[status].label for status in report.status]
+    for i, code in enumerate(report.event):
+        event = Event(int(code))
+        if not event.usable and report.outcomes[report.status[i]].usable:
+            labels[i] = event.label
+    return labels
 
 
 def print_legs(report: Report, platform: Platform, screen: Console) -> None:

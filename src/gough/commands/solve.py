@@ -34,6 +34,9 @@ def run(
     leg_noise: Annotated[float | None, option(metavar="S")] = None,
     angles: Annotated[Literal["deg", "rad"] | None, option(metavar="deg|rad")] = None,
     keep: Keep = "",
+    follow: Annotated[bool, option()] = False,
+    max_shift: Annotated[float | None, option(metavar="S")] = None,
+    max_turn: Annotated[float | None, option(metavar="DEG")] = None,
     allow_failures: AllowFailures = False,
     head: Head = 5,
     json: Json = False,
@@ -64,20 +67,32 @@ def run(
             deviation (in their unit) cause; those of rotations are in the unit of --angles, else
             in radians.
         angles: Write Euler angles, R = Rx Ry Rz, in this unit instead of quaternions.
+        follow: Take rows for consecutive: start each at the pose before, and write an event of
+            each, such as followed, found or jumped. Rows whose pose is not taken have none.
+        max_shift: With --follow allow this translation from row to row, in the platform's unit;
+            2 % of its size without it.
+        max_turn: With --follow allow this rotation from row to row, in degrees; 5.7 without it.
     """
+    import math
+
     from gough.commands import as_json, show
     from gough.commands.given import legs_given
+    from gough.errors import InputError
     from gough.files import solve_file
     from gough.platform import Platform
 
     given = legs_given(legs)
+    limits = {"max_shift": max_shift, "max_turn": max_turn and math.radians(max_turn)}
+    limits = {name: value for name, value in limits.items() if value is not None}
+    if limits and not follow:
+        raise InputError("--max-shift, --max-turn: limits of --follow; pass it, or leave them out")
     machine = Platform.load(platform)
     with show.progress_bar() as progress:
         report = solve_file(
             given, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
             reading=reading.of(platform, keep),
             head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
-            workers=workers, frame=frame,
+            workers=workers, frame=frame, follow=limits if follow else None,
         )  # fmt: skip
     if json:
         poses = as_json.first_poses(report, angles)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough import home_mode, quaternion
 from gough.checks import Array
 from gough.export.precision import Precision
-from gough.kernel import cycle, descent, layout
+from gough.kernel import cycle, descent, layout, rows
 from gough.kernel.constants import SINGULAR, kernel_constants
 from gough.limit_rules import SLACK
 from gough.platform import Platform
@@ -114,6 +114,7 @@ def _limits(precision: Precision) -> list[str]:
         "HOPELESS": descent.HOPELESS,
         "FLAT": descent.FLAT,
         "TINY": precision.tiny,
+        "FARTHEST": rows.FARTHEST,
         "SHIFT_STEP": home_mode.TRANSLATION_STEP,
         "TURN_STEP": home_mode.ROTATION_STEP,
         "SAME_TIP": precision.tip_slack,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -32,9 +32,9 @@ from gough.files.formats import (
     open_source,
     source_frame,
 )
-from gough.files.log_format import LogFormat
+from gough.files.log_format import LogFormat, time_column
 from gough.files.metadata import describe
-from gough.files.plausible import check_plausible
+from gough.files.plausible import cause, check_plausible
 from gough.files.report import Report
 from gough.files.rows import Block, Reading, Sink, Source
 from gough.fk.solution import solution_columns
@@ -44,6 +44,9 @@ from gough.platform import Platform
 from gough.pose import poses_from_columns
 from gough.status import InverseStatus, Status
 from gough.tables import label_column, number_column
+
+if TYPE_CHECKING:
+    from gough.fk.tracker import Tracker
 
 Progress = Callable[[Source, Report], None]
 
@@ -60,6 +63,7 @@ def solve_file(
     progress: Progress | None = None,
     certify: bool = False,
     ambiguous: bool = False,
+    follow: Mapping[str, float] | None = None,
     **settings: object,
 ) -> Report:
     """Solve a file of leg readings, row for row.
@@ -79,6 +83,8 @@ def solve_file(
         head: number of first rows that the report holds.
         progress: called after every block with the file and the counts so far.
         certify, ambiguous: as for `gough.solve`.
+        follow: rows are consecutive, and each starts at the pose before; arguments of
+            `gough.Tracker`, such as max_shift, or {}. Adds the column event.
         settings: of `gough.Solver`: seed, tolerance, max_iterations and others.
 
     Raises:
@@ -93,23 +99,42 @@ def solve_file(
 
     frame: Any = settings.get("frame")
     report = Report(tuple(Status), head, frame or "")
-    written = solution_names(angles, leg_noise is not None, certify)
+    written = solution_names(angles, leg_noise is not None, certify, follow is not None)
     with _open_job(legs, out, platform, reading, file_leg_columns, written, frame) as job:
         solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
+        tracker = None if follow is None else _tracker(platform, settings, follow)
+        report.time = "" if tracker else time_column(job.source.columns, reading.log)
         for block in job.blocks:
             readings = block.numbers(LEGS)
             if report.rows == 0:
                 check_plausible(job.source, platform, readings)
-                solver.compile(len(block), certify=certify)
+                solver.compile(1 if tracker else len(block), certify=certify)
                 report.start()
-            solution = solver(readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
-            report.add(solution.pose, readings, solution.status, solution.residual)
+            if tracker:
+                solution = tracker.follow(readings, leg_noise=leg_noise)
+                solution = solution.in_frame(platform, frame) if frame else solution
+            else:
+                solution = solver(
+                    readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous
+                )
+            report.add(solution.pose, readings, solution.status, solution.residual, solution.event)
             invalid = solution.status == Status.INVALID_INPUT
             report.describe_invalid(block, invalid, lambda i, legs=readings: _leg_fault(legs[i]))
+            lost = solution.status == Status.UNREACHABLE
+            report.describe_unlikely(block, lost, lambda i, legs=readings: cause(platform, legs[i]))
             job.write(block, solution_columns(solution, angles))
             if progress:
                 progress(job.source, report)
     return report
+
+
+def _tracker(platform: Platform, settings: dict, follow: Mapping[str, float]) -> Tracker:
+    """A tracker with the settings of a `Solver`, as far as it has them."""
+    from gough.fk.solve import make_tracker
+
+    shared = {name: settings[name] for name in ("tolerance", "singular") if name in settings}
+    seed: Any = settings.get("seed", "auto")
+    return make_tracker(platform, seed, **shared, **follow)
 
 
 def inverse_file(

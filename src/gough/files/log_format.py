@@ -31,6 +31,11 @@ QUANTITIES = (
     "", "pos", "position", "length", "len", "angle", "reading", "act", "actual", "meas",
     "measured", "fb", "feedback", "abs",
 )  # fmt: skip
+# names of columns of times
+TIMES = (
+    "time", "t", "times", "timestamp", "time stamp", "time_stamp", "stamp", "datetime", "date time",
+    "date", "utc", "clock", "zeit", "time_s", "time_ms", "t_s", "t_ms", "seconds", "ms",
+)  # fmt: skip
 NUMBERED = re.compile(r"(?P<word>[^\W\d_]+)[\s_.#-]*(?P<digit>[0-6])[\s_.-]*(?P<tail>[^\W\d]*)")
 UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$")
 
@@ -166,6 +171,14 @@ class LogFormat:
         factor = np.array(factors)
         used = given or next(iter(filter(None, stated)), "") or target
         return factor * self.scale, factor * self.offset, used
+
+
+def time_column(names: Sequence[str], form: LogFormat) -> str:
+    """The column of times among `names`: the one that was given, or one named like it, or ""."""
+    if form.time in names:
+        return form.time
+    found = [name for name in names if split_unit(name)[0].strip("# ").lower() in TIMES]
+    return found[0] if found else ""
 
 
 def split_unit(name: str) -> tuple[str, str]:

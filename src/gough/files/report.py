@@ -13,7 +13,7 @@ from gough.checks import Array
 from gough.errors import GoughError
 from gough.files.rows import Block
 from gough.pose import Pose
-from gough.status import Outcome
+from gough.status import Event, Outcome
 
 DESCRIBED = 5  # invalid rows that are described one by one
 
@@ -28,7 +28,11 @@ class Report:
         counts: rows of each status.
         worst: largest residual of each status [platform unit], NaN where there is none.
         invalid: place and fault of each of the first few invalid rows.
-        pose, legs, status: the first rows, at most `head`.
+        unlikely: place and likely cause of the first few rows that no pose can have.
+        events: rows of each `Event`, where rows were followed one after another.
+        held: rows with a usable status whose pose was not taken for their event.
+        time: a column of times that the rows were not followed by, or "".
+        pose, legs, status, event: the first rows, at most `head`; no events where there are none.
         seconds: time taken by the rows.
         frame: whose poses those are, such as "tool in work"; "" for the platform's.
         preparing: time before them, to compile the solver and to fit its seed.
@@ -40,9 +44,14 @@ class Report:
     counts: NDArray[np.int64] = field(init=False)
     worst: Array = field(init=False)
     invalid: list[str] = field(default_factory=list)
+    unlikely: list[str] = field(default_factory=list)
+    events: NDArray[np.int64] | None = None
+    held: int = 0
+    time: str = ""
     pose: Pose = field(default_factory=lambda: Pose(np.empty((0, 3))))
     legs: Array = field(default_factory=lambda: np.empty((0, 6)))
     status: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
+    event: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     seconds: float = 0.0
     preparing: float = 0.0
 
@@ -66,12 +75,24 @@ class Report:
     @property
     def failures(self) -> int:
         """Number of rows whose result cannot be used."""
-        return sum(int(n) for n, o in zip(self.counts, self.outcomes, strict=True) if not o.usable)
+        unusable = [not outcome.usable for outcome in self.outcomes]
+        return int(self.counts[unusable].sum()) + self.held
 
     def add(
-        self, pose: Pose, legs: Array, status: NDArray[np.uint8], residual: Array | None = None
+        self,
+        pose: Pose,
+        legs: Array,
+        status: NDArray[np.uint8],
+        residual: Array | None = None,
+        event: NDArray[np.uint8] | None = None,
     ) -> None:
         """Count a block of rows."""
+        if event is not None:
+            counts = np.bincount(event, minlength=len(Event))
+            self.events = counts if self.events is None else self.events + counts
+            usable = np.array([outcome.usable for outcome in self.outcomes])[status]
+            new = np.array([event.usable for event in Event])[event]
+            self.held += int(np.sum(usable & ~new))
         counts = np.bincount(status, minlength=len(self.outcomes))
         self.counts += counts
         if residual is not None:
@@ -84,6 +105,8 @@ class Report:
             np.concatenate([self.pose.wxyz, pose.wxyz[part]]),
         )
         self.legs = np.concatenate([self.legs, legs[part]])
+        if event is not None:
+            self.event = np.concatenate([self.event, event[part]])
         self.status = np.concatenate([self.status, status[part]])
         self.seconds = time.perf_counter() - self._start
 
@@ -99,3 +122,19 @@ class Report:
         """
         for row in map(int, np.flatnonzero(rows)[: DESCRIBED - len(self.invalid)]):
             self.invalid.append(f"{block.place(row)}: {block.bad.get(row) or fault(row)}")
+
+    def describe_unlikely(
+        self, block: Block, rows: NDArray[np.bool_], cause: Callable[[int], str]
+    ) -> None:
+        """Describe the first few rows of the file that have no pose for a likely cause.
+
+        Args:
+            block: the rows' block.
+            rows: (N,), True for rows that no pose has.
+            cause: gives the likely cause, "" where none is known.
+        """
+        for row in map(int, np.flatnonzero(rows)):
+            if len(self.unlikely) == DESCRIBED:
+                return
+            if text := cause(row):
+                self.unlikely.append(f"{block.place(row)}: {text}")

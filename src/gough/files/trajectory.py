@@ -165,6 +165,8 @@ def open_trajectory(
     """
     with closing(open_source(path, platform, reading)) as source:
         columns = pose_or_leg_columns(source.where, source.columns)
+        if time is None and source.reading.log.time in source.columns:
+            time = source.reading.log.time
         if time is not None:
             checked(source.where, source.columns, (time,))
         frame = source_frame(source, platform, None)

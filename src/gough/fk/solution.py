@@ -13,7 +13,7 @@ from gough.columns import Angles, solution_names
 from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose, pose_cells, pose_table
-from gough.status import USABLE, Status
+from gough.status import USABLE, Event, Status
 from gough.tables import Kind, Table, TableInfo, label_column, make_frame, number_column
 from gough.text import number, page, pose_heads, rows_of, with_unit
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 LABELS = tuple(status.label for status in Status)
+EVENTS = tuple(event.label for event in Event)
+NEW = tuple(event for event in Event if event.usable)  # events that give a new pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +30,7 @@ class Solution:
     """Poses of a batch of readings, with status and accuracy of each.
 
     Attributes:
-        pose: batch axes (...) as the legs had; NaN where the input was invalid.
+        pose: batch axes (...) as the legs had; NaN in rows without a pose.
         status: (...) uint8, to be compared with `Status` members; a `Status` for a single row.
         residual: (...) largest difference between a strut's length at the pose and the length
             that its reading stands for [platform unit]; NaN where the input was invalid.
@@ -39,6 +41,8 @@ class Solution:
         unit: name of the platform's length unit, a label.
         frame: whose poses these are, such as "tool in work"; "" for those of the platform.
         table: library and row labels of the table of readings, if they came in one.
+        event: (N,) uint8, to be compared with `Event` members, if rows were followed one after
+            another; else None.
     """
 
     pose: Pose
@@ -50,11 +54,13 @@ class Solution:
     unit: str = ""
     frame: str = ""
     table: TableInfo | None = None
+    event: NDArray[np.uint8] | None = None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
         """Rows (...) whose pose has these legs and is, as far as is known, the machine's."""
-        return np.isin(self.status, USABLE)
+        usable = np.isin(self.status, USABLE)
+        return usable if self.event is None else usable & np.isin(self.event, NEW)
 
     def counts(self) -> dict[Status, int]:
         """Return the number of rows of each status that occurs, in the order of `Status`."""
@@ -69,6 +75,7 @@ class Solution:
         return Solution(
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
             covariance, radius, self.unit, self.frame, self.table and self.table.at(index),
+            None if self.event is None else self.event[index],
         )  # fmt: skip
 
     def in_frame(self, platform: Platform, name: str) -> Solution:
@@ -141,7 +148,7 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
     Raises:
         GoughError: angles of another name.
     """
-    with_covariance, with_radius = solution.covariance is not None, solution.radius is not None
+    optional = [part is not None for part in (solution.covariance, solution.radius, solution.event)]
     numbers = [np.ravel(solution.residual), np.ravel(solution.iterations)]
     if solution.covariance is not None:
         variances = np.diagonal(solution.covariance, axis1=-2, axis2=-1)
@@ -153,4 +160,6 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
         numbers.append(np.ravel(solution.radius))
     status = label_column(np.ravel(solution.status), LABELS)
     columns = [*pose_table(solution.pose, angles).values(), status, *map(number_column, numbers)]
-    return dict(zip(solution_names(angles, with_covariance, with_radius), columns, strict=True))
+    if solution.event is not None:
+        columns.append(label_column(solution.event, EVENTS))
+    return dict(zip(solution_names(angles, *optional), columns, strict=True))

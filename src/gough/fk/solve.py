@@ -22,6 +22,9 @@ from gough.seeds.base import PoseSeed, Seed, Start, find_seed, further_starts, s
 from gough.status import USABLE, Status
 from gough.tables import Table, TableInfo, as_readings, table_info
 
+if TYPE_CHECKING:
+    from gough.fk.tracker import Tracker
+
 FEW = 1_024  # rows that the row solver takes without the block solver, which compiles longer
 LIMITS = {"tolerance": 1.0, "max_iterations": 10_000, "restarts": 10_000, "singular": 1.0}
 
@@ -40,19 +43,51 @@ def solve(
     leg_noise: ArrayLike | None = None,
     certify: bool = False,
     ambiguous: bool = False,
+    follow: bool = False,
 ) -> Solution:
     """Poses that have the given leg readings, each with a status.
 
     Calls a `gough.Solver` made with these settings; see there for `seed` to `frame`, and
     `Solver.__call__` for the rest and what is raised.
 
+    Args:
+        follow: rows (N, 6) are consecutive: each starts at the pose before, as in a
+            `gough.Tracker` with its usual limits, and `Solution.event` says of each what
+            `Tracker.event` does. A `seed` that is a pose is the machine's before the first row.
+            For other limits call `Tracker.follow`.
+
     Example:
         >>> platform = gough.Platform.load("reference")
         >>> gough.solve(platform, platform.home_legs).status
         <Status.CONVERGED: 0>
     """
+    if follow:
+        if certify or ambiguous:
+            raise GoughError("follow: certify and ambiguous look at each row alone; leave them out")
+        tracker = make_tracker(platform, seed, tolerance=tolerance, singular=singular)
+        found = tracker.follow(legs, leg_noise=leg_noise)
+        return found.in_frame(platform, frame) if frame else found
     solver = Solver(platform, seed, tolerance, max_iterations, restarts, singular, workers, frame)
     return solver(legs, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
+
+
+def make_tracker(platform: Platform, seed: str | Seed | Pose, **limits: float | None) -> Tracker:
+    """Return a tracker for consecutive rows.
+
+    Args:
+        seed: the machine's pose before the first row, or "auto" to find it from that row.
+        limits: arguments of `gough.Tracker`.
+
+    Raises:
+        GoughError: another seed.
+    """
+    from gough.fk.tracker import Tracker
+
+    given = isinstance(seed, Pose) and not seed.batch
+    if not given and seed not in ("auto", "home"):
+        raise GoughError("seed: rows that follow each other start at one pose, or at auto or home")
+    start = seed if isinstance(seed, Pose) else platform.home if seed == "home" else None
+    return Tracker(platform, start=start, **limits)  # pyright: ignore[reportArgumentType]
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,16 @@ from numpy.typing import ArrayLike
 from gough import quaternion, velocities
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.fk.solve import Solver
+from gough.fk.solution import Solution
+from gough.fk.solve import Rows, Solver
 from gough.kernel import layout
 from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
-from gough.kernel.cycle import BAD_READING, CROSSED, FAILED, STATE, cycle
-from gough.kinematics import assembly_sign
+from gough.kernel.cycle import BAD_READING, CROSSED, FAILED, OURS, SIGN, STATE, cycle
+from gough.kinematics import assembly_sign, pose_covariance
 from gough.platform import Platform
 from gough.pose import Pose, pose_cells
 from gough.status import Event, Status
-from gough.tables import Table, as_readings, is_arrow
+from gough.tables import Table, as_readings, is_arrow, table_info
 from gough.text import page, pose_heads
 
 PLAIN = (np.ndarray, list, tuple)  # readings without names, recognised quickly
@@ -96,6 +97,10 @@ class Tracker:
         self._elapsed = 1  # cycles since the last pose
         self._rates: ArrayLike | None = None
         self._missed, self._agreeing = 0, 0
+        self._miss = (
+            np.nan,
+            0,
+        )  # residual and iterations of the last reading that was not followed
         self._candidate: Pose | None = None
         self.pose = Pose.trusted(self._position[0], self._wxyz[0])
         self._code, self.event = int(Status.CONVERGED), Event.FOUND
@@ -158,6 +163,69 @@ class Tracker:
                 self._reset_missed()
         return self.pose
 
+    def follow(self, legs: ArrayLike | Table, *, leg_noise: ArrayLike | None = None) -> Solution:
+        """Follow consecutive readings, row by row as `update` does, in compiled code.
+
+        Another call goes on where this one ended, so that a long series may come in parts.
+
+        Args:
+            legs: readings (N, 6), or a table with columns leg_1 to leg_6.
+            leg_noise: as for `gough.solve`.
+
+        Returns:
+            Solution: batch (N,); `Solution.event` is the `Event` of each row, and rows whose
+            event is HELD, JUMPED or MODE_CHANGED have no pose.
+
+        Raises:
+            GoughError: legs of another shape, or a table without these columns.
+        """
+        from gough.kernel.follow import follow
+
+        readings = as_readings(legs)
+        if readings.ndim != 2:
+            raise GoughError(f"legs: expected consecutive rows (N, 6), got {readings.shape}")
+        flat, rows = np.array(readings, order="C"), Rows.empty(len(readings))
+        events = np.full(len(flat), Event.FOLLOWED, np.uint8)
+        row = 0
+        while row < len(flat):
+            if not self._lost and not self._missed:
+                first = row
+                row = follow(
+                    self._constants, flat, row, self._legs, self._state, self._limits, self._buffer,
+                    self._work, self._position, self._wxyz, rows.arrays(),
+                )  # fmt: skip
+                if row == len(flat):
+                    self._keep_last_but_one(rows, first, row)
+                    break
+            self.update(flat[row])
+            self._put(rows, row)
+            events[row] = self.event
+            row += 1
+        pose = Pose.trusted(rows.position, rows.wxyz)
+        covariance = None if leg_noise is None else pose_covariance(self.platform, pose, leg_noise)
+        return Solution(
+            pose, rows.status, rows.residual, rows.iterations, covariance,
+            unit=self.platform.unit, table=table_info(legs), event=events,
+        )  # fmt: skip
+
+    def _put(self, rows: Rows, row: int) -> None:
+        """Copy the last cycle's results; a row whose pose was not taken has none."""
+        new = self.event.usable
+        rows.position[row] = self._position[0] if new else np.nan
+        rows.wxyz[row] = self._wxyz[0] if new else np.nan
+        rows.status[row] = self._code
+        rows.residual[row], rows.iterations[row] = self._miss
+        if self.event == Event.FOLLOWED:
+            rows.residual[row] = self._buffer[layout.RESIDUAL] * self.platform.size
+            rows.iterations[row] = int(self._buffer[layout.COUNT])
+
+    def _keep_last_but_one(self, rows: Rows, first: int, end: int) -> None:
+        """Take over the state of rows that were followed in compiled code."""
+        self._rates, self._elapsed = None, 1
+        self._code, self.event = int(rows.status[end - 1]), Event.FOLLOWED
+        if end - first > 1:
+            self._last_position[0], self._last_wxyz[0] = rows.position[end - 2], rows.wxyz[end - 2]
+
     def __repr__(self) -> str:
         state = f"{self.event.name.lower()}, {self.status.label}"
         return f"Tracker({self.platform.name!r}, {state}, {self.pose!r})"
@@ -196,8 +264,8 @@ class Tracker:
         """
         self._state[0, :7] = to_internal(self._constants, pose)
         home = self._constants[layout.HOME_SIGN]
-        self._state[0, 7] = float(assembly_sign(self.platform, pose)) * home
-        self._state[0, 8] = float(trusted)
+        self._state[0, SIGN] = float(assembly_sign(self.platform, pose)) * home
+        self._state[0, OURS] = float(trusted)
         self._position[0], self._wxyz[0] = pose.position, pose.wxyz
         self._reset_missed()
 
@@ -207,11 +275,13 @@ class Tracker:
         """Hold the pose, and take another place once enough readings agree on it."""
         self._missed += 1
         self._set_limits()
+        self._miss = (np.nan, 0)
         if code == BAD_READING:
             self._code, self.event = int(Status.INVALID_INPUT), Event.HELD
             return
         found = self._solver(self._legs[0])
         self._code, usable = int(found.status), bool(found.usable)
+        self._miss = float(found.residual), int(found.iterations)
         if not usable and self._code not in (Status.OTHER_MODE, Status.AMBIGUOUS):
             self.event = Event.HELD
             return

@@ -26,7 +26,8 @@ CROSSED = OPEN + 2  # a singularity lies between the pose and the last
 BAD_READING = OPEN + 3  # not finite, or not above zero
 
 STEPS = np.int64(12)  # a warm start needs one to three
-STATE = 9  # internal pose 7; sign of the determinant; 1 where the mode is the machine's, else 0
+# The state: internal pose 7; sign of the determinant; 1 if the mode is the machine's, else 0.
+STATE, SIGN, OURS = 9, 7, 8
 
 
 @jit()
@@ -47,7 +48,7 @@ def cycle(constants, legs, state, limits, buffer, work, position, wxyz):
     put_pose(buffer, FIRST, SINGLE, state, FIRST)
     if not newton(constants, buffer, limits[0], STEPS):
         return FAILED
-    if buffer[DETERMINANT] * state[0, 7] < 0:
+    if buffer[DETERMINANT] * state[0, SIGN] < 0:
         return CROSSED
     put_user_position(constants, buffer, FIRST, SINGLE)
     moved, along = 0.0, 0.0
@@ -60,8 +61,8 @@ def cycle(constants, legs, state, limits, buffer, work, position, wxyz):
         return TOO_FAR
     for i in range(7):
         state[0, i] = buffer[i]
-    state[0, 7] = 1.0 if buffer[DETERMINANT] > 0 else -1.0
+    state[0, SIGN] = 1.0 if buffer[DETERMINANT] > 0 else -1.0
     if buffer[INSIDE] == 1.0 and constants[HOME_SIGN] != 0.0:
-        state[0, 8] = 1.0
+        state[0, OURS] = 1.0
     get_pose(buffer, FIRST, SINGLE, position, wxyz, FIRST)
-    return status_of_pose(constants, buffer, legs, FIRST, limits[1], state[0, 8] == 1.0, work)
+    return status_of_pose(constants, buffer, legs, FIRST, limits[1], state[0, OURS] == 1.0, work)

@@ -5,7 +5,7 @@ It solves all rows of small batches, and of large ones those that the block solv
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf, nan, sqrt
 
 import numpy as np
 
@@ -47,6 +47,7 @@ STEPS = np.int64(10)  # of plain Newton, in blocks too, before the damped method
 ENOUGH_STARTS, FEW_STARTS = 8, 2
 # Ranks of poses: the machine's is looked for in this order.
 NO_POSE, OTHER, OURS, WITHIN = 0, 1, 2, 3  # OURS: home's mode; WITHIN: in the workspace, too
+FARTHEST = 5.0  # length of a leg, as a share of the size, that none could have
 PATIENCE = 6  # times the limit, for the last look at a row that no start settled
 
 
@@ -89,6 +90,11 @@ def solve_rows(constants, legs, rows, guess, starts, settings, work, out):
         statuses[row] = status
         put_user_position(constants, buffer, FIRST, SINGLE)
         get_pose(buffer, FIRST, SINGLE, position, wxyz, row)
+        if status == UNREACHABLE:  # the nearest pose is none of the machine's
+            for i in range(3):
+                position[row, i] = nan
+            for i in range(4):
+                wxyz[row, i] = nan
         residuals[row] = buffer[RESIDUAL] * constants[SIZE]
         iterations[row] = count
     return invalid
@@ -192,6 +198,9 @@ def status_of_pose(constants, buffer, legs, row, singular, ours, work):
     Args:
         ours: the pose is in the machine's assembly mode, as far as is known.
     """
+    for i in range(6):
+        if buffer[LENGTH + i] > FARTHEST:
+            return UNREACHABLE
     if not ours:
         return OTHER_MODE if constants[HOME_SIGN] != 0.0 else AMBIGUOUS
     if buffer[REGULAR] == 0.0:
@@ -206,7 +215,7 @@ def status_of_pose(constants, buffer, legs, row, singular, ours, work):
 
 @inner
 def _out_of_reach(constants, buffer):
-    """Return whether the lengths are impossible by the triangle inequality alone.
+    """Return whether a leg is longer than any could be, or lengths break the triangle inequality.
 
     Legs i and j join points whose distances are B on the base and Q on the platform, so
     l_i + l_j + Q >= B,  l_i + l_j + B >= Q  and  |l_i - l_j| <= B + Q. A wrong unit breaks one
@@ -222,6 +231,8 @@ def _out_of_reach(constants, buffer):
             B, Q = sqrt(B), sqrt(Q)
             li, lj = buffer[LENGTH + i], buffer[LENGTH + j]
             slack = 1e-9 * (B + Q + li + lj)
+            if li > FARTHEST or lj > FARTHEST:
+                return True
             if li + lj + slack < abs(B - Q) or abs(li - lj) > B + Q + slack:
                 return True
     return False

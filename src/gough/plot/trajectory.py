@@ -53,7 +53,10 @@ class Envelope:
         width: rows in a bin.
         rows: rows added.
         unanswered: number of them without a usable pose.
+        time: name of the column on the horizontal axis, or "row".
     """
+
+    time = "row"
 
     def __init__(self, names: tuple[str, ...], bins: int = BINS) -> None:
         self.names, self.width, self.rows, self.unanswered = names, 1, 0, 0
@@ -136,7 +139,8 @@ def read_trajectory(
     Args:
         path: .csv or .parquet; a file that has the columns of a pose is read as poses.
         platform: the machine.
-        time: the column on the horizontal axis; without it rows are counted from 1.
+        time: the column on the horizontal axis; without it that of the platform file's [readings],
+            or else rows are counted from 1.
         seed: first guess for leg readings, as for `gough.solve`.
         reading: options for reading the file.
         tick: called after every block.
@@ -146,6 +150,7 @@ def read_trajectory(
     """
     envelope = Envelope(SIGNALS)
     with open_trajectory(path, platform, time=time, seed=seed, reading=reading) as file:
+        envelope.time = file.time or "row"
         for rows in file.blocks(tick):
             found = file.solve(rows)
             values = signals(platform, found.legs, found.pose)

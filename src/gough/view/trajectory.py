@@ -126,6 +126,7 @@ def read(
         raise GoughError(f"--rows {rows}: expected 2 or more")
     thin = Thin(rows)
     with files.open_trajectory(path, platform, time=time, reading=reading) as file:
+        time = file.time
         for block in file.blocks():
             thin.add(block)
     found = file.solve(thin.rows)

@@ -580,6 +580,9 @@ static int is_ours(const problem *w, problem *scratch, const hexapod_pose *given
 /* `ours`: the pose is in the machine's assembly mode, as far as is known. */
 static hexapod_status judge(const problem *w, int outcome, int ours, const real legs[6])
 {
+    for (int i = 0; i < 6; i++) {
+        if (w->length[i] > FARTHEST) return HEXAPOD_UNREACHABLE;
+    }
     if (outcome == STATIONARY) return HEXAPOD_UNREACHABLE;
     if (outcome != SOLVED) return HEXAPOD_NOT_CONVERGED;
     if (!ours) return HEXAPOD_OTHER_MODE;
