@@ -158,17 +158,20 @@ def _fitting_rows(report: Report, places: int) -> list[list[str]]:
     """The first poses and their statuses, with as many digits as leave room for the statuses."""
     angles = np.degrees(report.pose.euler)
     labels = _labels(report)
-    for drop in range(places + 1):
-        rows = [
+
+    def written(drop: int) -> list[list[str]]:
+        return [
             [f"{v:.{places - drop}f}" for v in position]
             + [f"{v:.{max(5 - drop, 2)}f}" for v in turn]
             + [label]
             for position, turn, label in zip(report.pose.position, angles, labels, strict=True)
         ]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+
+    for drop in range(places):
+        widths = [max(map(len, column)) for column in zip(*written(drop), strict=True)]
         if sum(max(width, 6) + 1 for width in widths) <= WIDTH:
-            break
-    return rows
+            return written(drop)
+    return written(places)
 
 
 def _labels(report: Report) -> list[str]:

@@ -64,6 +64,8 @@ def solve(
     if follow:
         if certify or ambiguous:
             raise GoughError("follow: certify and ambiguous look at each row alone; leave them out")
+        if frame and isinstance(seed, Pose):
+            seed = platform.frame(frame).platform_pose(seed)
         tracker = make_tracker(platform, seed, tolerance=tolerance, singular=singular)
         found = tracker.follow(legs, leg_noise=leg_noise)
         return found.in_frame(platform, frame) if frame else found
@@ -243,7 +245,7 @@ class Solver:
         if self._is_unsure:
             best = choose_mode(modes).best
             chosen = usable[modes.row[best]]
-            rows.put(chosen, replace(self, seed=modes.pose[best])(legs[chosen]))
+            rows.put(chosen, replace(self, seed=modes.pose[best], frame=None)(legs[chosen]))
         pose = Pose.trusted(rows.position[usable], rows.wxyz[usable])
         unknown = ambiguous(modes, ~self.platform.in_workspace(pose))
         if self._is_unsure:
