@@ -65,7 +65,7 @@ def cause(platform: Platform, legs: Array) -> str:
     if np.any(far):
         legs_far = np.flatnonzero(far)
         named = ", ".join(f"leg_{leg + 1} is {legs[leg]:.6g}" for leg in legs_far)
-        return f"{named}, and the legs beside are as at home: no signal, or a digit too many or too few?"
+        return f"{named}, the others are as near home: no signal, or a digit too many or too few?"
     return ""
 
 
