@@ -533,6 +533,28 @@ def test_a_moved_origin_is_the_same_machine(seed: int) -> None:
     np.testing.assert_allclose(tool.home.position, platform.home.apply(point))
 
 
+@given(support.seeds, st.floats(0, 89), st.sampled_from([0.0, 0.1, 3.0]))
+def test_a_moved_origin_keeps_every_pose_of_the_workspace(
+    seed: int, deg: float, far: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    platform = replace(machines.random_platform(seed), pivot=None)
+    widths = np.sort(rng.uniform(-1, 1, (3, 2)), axis=1)
+    platform = platform.with_workspace(0.1 * platform.size * widths, deg * widths[::-1])
+    point = far * platform.size * rng.standard_normal(3)
+    pose = platform.sample_poses(2_000, seed=1)
+    tool = platform.with_origin_at(point)
+    at_tool = Pose(pose.apply(point), pose.wxyz)
+    assert np.all(tool.in_workspace(at_tool))
+    # and little more: every face of the new box is nearly touched
+    box, lever = tool.workspace, np.linalg.norm(point)
+    assert box is not None
+    shift = at_tool.position - tool.home.position
+    slack = 0.02 * lever + 0.2 * np.ptp(box.translation, axis=1).max() + 1e-12 * platform.size
+    assert np.all(shift.min(axis=0) - box.translation[:, 0] < slack)
+    assert np.all(box.translation[:, 1] - shift.max(axis=0) < slack)
+
+
 def test_a_pivot_and_a_moved_origin_exclude_each_other() -> None:
     with pytest.raises(PlatformError, match="pivot: a platform has a pivot or a moved origin"):
         Platform.load("rubin_camera").with_origin_at((0, 0, 1))

@@ -227,7 +227,9 @@ class Platform:
         """Copy whose poses give the position of `point` (3,) of the platform [platform unit].
 
         The point may be a tool tip, a mirror's vertex or a camera. Positions are that point's, in
-        base coordinates, and rotations are about it.
+        base coordinates, and rotations are about it. A stated workspace becomes the box of the
+        point's positions that holds all poses of it, and some more (`Workspace.seen_at`); frames
+        (`with_frames`) keep the workspace as it is.
         """
         p = platform_field("point", point, (3,))
         if self.pivot is not None:
@@ -236,7 +238,8 @@ class Platform:
             raise PlatformError("frames: state the point as a frame, such as tool_in_platform")
         home = Pose(self.home.apply(p), self.home.wxyz)
         limits = self.limits and self.limits.with_origin_at(p)
-        return replace(self, moving=self.moving - p, home=home, limits=limits)
+        space = self.workspace and self.workspace.seen_at(self.home, p)
+        return replace(self, moving=self.moving - p, home=home, limits=limits, workspace=space)
 
     # ---- frames -----------------------------------------------------------------------
 

@@ -12,6 +12,8 @@ from gough.checks import Array, platform_field, platform_numbers
 from gough.errors import GoughError, PlatformError
 from gough.pose import Pose
 
+GRID = 25  # rotations along each axis at which `Workspace.seen_at` looks
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class Workspace:
@@ -55,6 +57,28 @@ class Workspace:
             platform_numbers("workspace.rotation_deg", rotation_deg),
         ]
         return cls(*(np.tile([-b, b], (3, 1)) if b.ndim == 0 else b for b in boxes))
+
+    def seen_at(self, home: Pose, point: Array) -> Workspace:
+        """Box for the positions of another point of the platform that holds all poses of this one.
+
+        A point moves when the platform rotates, so poses of this box have positions of the point
+        that fill no box: the new one holds others, too. It is the smallest to a thousandth of the
+        lever.
+
+        Args:
+            home: the pose at rest.
+            point: (3,) from the point that positions refer to now, in platform coordinates.
+        """
+        axes = [np.linspace(low, high, GRID) for low, high in np.radians(self.rotation_deg)]
+        angles = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        turned = quaternion.to_matrix(quaternion.from_euler(angles)) @ point - point
+        shift = turned @ home.rotation.T
+        # where a component is largest between points of the grid its first derivatives vanish
+        # along the free angles, and its second ones are at most the lever
+        step = np.radians(np.ptp(self.rotation_deg, axis=1)) / (GRID - 1)
+        spare = np.linalg.norm(point) * np.sum(step / 2) ** 2 / 2
+        ends = np.stack([shift.min(axis=0) - spare, shift.max(axis=0) + spare], axis=-1)
+        return Workspace(self.translation + ends, self.rotation_deg)
 
     def sample(self, home: Pose, count: int, seed: int) -> Pose:
         """Draw poses evenly from the box, batch (count,); one seed always gives the same poses.
