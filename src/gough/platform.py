@@ -361,3 +361,19 @@ def _plain(key: str, value: Array) -> list | float:
     if key in ("arm_length", "rod_length") and np.all(value == value[0]):
         return float(value[0])
     return value.tolist()
+
+
+def as_platform(platform: Platform | str | Path) -> Platform:
+    """Return a platform as it is, or load the one of a catalog name or of a .toml file's path.
+
+    Raises:
+        PlatformError: something else, or no such platform.
+    """
+    if isinstance(platform, (str, Path)):
+        return Platform.load(platform)
+    if not isinstance(platform, Platform):
+        raise PlatformError(
+            "platform: expected a Platform, a name in the catalog or the path of a .toml file, "
+            f"found {type(platform).__name__}"
+        )
+    return platform

@@ -33,6 +33,22 @@ def test_small_batches_agree_with_large_ones(name):
         assert np.mean(close) > 0.99
 
 
+def test_a_catalog_name_or_a_path_will_do_for_a_platform(tmp_path):
+    platform = gough.Platform.load("reference")
+    path = tmp_path / "mine.toml"
+    platform.save(path)
+    for given in ("reference", path, str(path)):
+        assert gough.solve(given, platform.home_legs).usable
+        assert gough.Solver(given).platform == platform  # pyright: ignore[reportArgumentType]
+    assert gough.Tracker("reference").platform == platform
+    assert len(gough.assembly_modes("reference", platform.home_legs)) == 16
+    for call in (gough.solve, gough.assembly_modes, lambda p, _: gough.Tracker(p)):
+        with pytest.raises(gough.PlatformError, match="did you mean 'reference'"):
+            call("refrence", platform.home_legs)
+        with pytest.raises(gough.PlatformError, match="platform: expected a Platform"):
+            call(None, platform.home_legs)  # pyright: ignore[reportArgumentType]
+
+
 def test_open_rows_are_solved_alike_in_small_and_large_batches():
     platform = gough.Platform.load("reference").with_workspace(100, 60)
     legs = gough.leg_lengths(platform, platform.sample_poses(3 * FEW, seed=5))

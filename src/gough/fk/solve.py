@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
 from gough.kernel.rows import STEPS, solve_rows
 from gough.kernel.threads import in_parts
 from gough.kinematics import home_sign, pose_covariance
-from gough.platform import Platform
+from gough.platform import Platform, as_platform
 from gough.pose import Pose
 from gough.seeds.base import PoseSeed, Seed, Start, find_seed, further_starts, starting_poses
 from gough.status import USABLE, Status
@@ -30,7 +31,7 @@ LIMITS = {"tolerance": 1.0, "max_iterations": 10_000, "restarts": 10_000, "singu
 
 
 def solve(
-    platform: Platform,
+    platform: Platform | str | Path,
     legs: ArrayLike | Table,
     *,
     seed: str | Seed | Pose = "auto",
@@ -51,6 +52,7 @@ def solve(
     `Solver.__call__` for the rest and what is raised.
 
     Args:
+        platform: the machine; a name in the catalog or the path of a .toml file will do.
         follow: rows (N, 6) are consecutive: each starts at the pose before, as in a
             `gough.Tracker` with its usual limits, and `Solution.event` says of each what
             `Tracker.event` does. A `seed` that is a pose is the machine's before the first row.
@@ -61,6 +63,7 @@ def solve(
         >>> gough.solve(platform, platform.home_legs).status
         <Status.CONVERGED: 0>
     """
+    platform = as_platform(platform)
     if follow:
         if certify or ambiguous:
             raise GoughError("follow: certify and ambiguous look at each row alone; leave them out")
@@ -151,6 +154,7 @@ class Solver:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "platform", as_platform(self.platform))
         for name, high in LIMITS.items():
             value = getattr(self, name)
             if not 0 <= value <= high:

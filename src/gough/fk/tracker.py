@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +17,7 @@ from gough.kernel import layout
 from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
 from gough.kernel.cycle import BAD_READING, CROSSED, FAILED, OURS, SIGN, STATE, cycle
 from gough.kinematics import assembly_sign, pose_covariance
-from gough.platform import Platform
+from gough.platform import Platform, as_platform
 from gough.pose import Pose, pose_cells
 from gough.status import Event, Status
 from gough.tables import Table, as_readings, is_arrow, table_info
@@ -54,7 +55,7 @@ class Tracker:
 
     def __init__(
         self,
-        platform: Platform,
+        platform: Platform | str | Path,
         *,
         start: Pose | None = None,
         max_shift: float | None = None,
@@ -78,6 +79,7 @@ class Tracker:
         Raises:
             GoughError: a limit that is not above zero.
         """
+        platform = as_platform(platform)
         self.platform = platform
         self._solver = Solver(platform, tolerance=tolerance, singular=singular, workers=1)
         self._max_shift = 0.02 * platform.size if max_shift is None else max_shift

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +26,7 @@ from gough.modes.frames import Problem, distinct
 from gough.modes.result import AssemblyModes, struts_of_sets
 from gough.modes.singular import Legs, classify, curve_of_poses, merge, poses_near
 from gough.modes.starts import SEED, StartSystem, start_system
-from gough.platform import Platform
+from gough.platform import Platform, as_platform
 from gough.status import ModesStatus
 from gough.tables import Table, as_readings, table_info
 
@@ -37,7 +38,7 @@ DISTANT = 1e3  # normalised: starts beyond belong to no pose, where the base joi
 
 
 def assembly_modes(
-    platform: Platform, legs: ArrayLike | Table, *, workers: int | None = None
+    platform: Platform | str | Path, legs: ArrayLike | Table, *, workers: int | None = None
 ) -> AssemblyModes:
     """All real poses for leg readings, each with a certificate, and whether the list is complete.
 
@@ -62,6 +63,7 @@ def assembly_modes(
         >>> gough.assembly_modes(platform, platform.home_legs)
         AssemblyModes(40 poses, complete)
     """
+    platform = as_platform(platform)
     readings = as_readings(legs)
     base, lengths = equivalent_struts(platform, readings.reshape(-1, 6))
     struts = base if platform.rotary is not None else platform.base[None], lengths
