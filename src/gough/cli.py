@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> None:
     signals.ignore()
     try:
         sys.stdout.flush()
-    except OSError:  # which has been said
+    except OSError:  # printed already
         _drop_output()
     logging.getLogger("gough").removeHandler(notes)
     sys.exit(code)

@@ -32,5 +32,5 @@ def suggestion(name: str, choices: Iterable[str]) -> str:
 
 
 def printable(text: str) -> str:
-    """Text with escapes in place of control characters, which files may have put into it."""
+    """Text with escapes instead of control characters, which files may have put into it."""
     return CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)

@@ -1,4 +1,4 @@
-"""What the parts of a machine allow, as stated in the table [limits] of its file."""
+"""Limits of a machine's parts, as stated in the table [limits] of its file."""
 
 from __future__ import annotations
 

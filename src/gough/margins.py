@@ -1,4 +1,4 @@
-"""How far a pose is from every limit of its machine, and how far each axis can still move."""
+"""Distances of a pose from every limit of its machine, and how far each axis can still move."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """How far poses can still move along and about the axes of the base.
+    """Distances that poses can still move along and about the axes of the base.
 
     Attributes:
         distance: (..., 6, 2) along x, y, z [platform unit] and about x, y, z [rad], first towards

@@ -294,7 +294,7 @@ class Platform:
         return self.workspace
 
     def in_workspace(self, pose: Pose) -> NDArray[np.bool_]:
-        """Whether poses (...) are in the workspace; True where none is stated.
+        """Return which poses (...) are in the workspace; True where none is stated.
 
         The box is widened by 1e-9 of the platform's size, so that poses on its faces count
         as inside in spite of rounding (see `gough.limit_rules`).
@@ -316,7 +316,7 @@ class Platform:
         return self is other or (self.digest == other.digest and self._label() == other._label())
 
     def _label(self) -> tuple[str, dict | None]:
-        """What is not in the digest: the name, and the limits as plain lists."""
+        """Facts that are not in the digest: the name, and the limits as plain lists."""
         return self.name, self.limits and self.limits.to_dict()
 
     def __hash__(self) -> int:

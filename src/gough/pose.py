@@ -243,8 +243,8 @@ class Pose:
 
         Args:
             kind: "pandas", "polars" or "pyarrow"; pandas unless given.
-            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz), in
-                place of the quaternion.
+            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz),
+                instead of the quaternion.
 
         Raises:
             GoughError: another kind or angle, or a library that is not installed.

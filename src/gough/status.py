@@ -119,7 +119,7 @@ class InverseStatus(Outcome):
 class ModesStatus(Outcome):
     """Outcome of the search for every assembly mode of one set of readings."""
 
-    COMPLETE = 0, "Every complex solution was found and told apart: no pose is missing."
+    COMPLETE = 0, "Every complex solution was found, and all differ: no pose is missing."
     SINGULAR = 1, (
         "At least one pose is singular: several solutions meet there, so the readings fix it "
         "poorly, and it cannot be certified; every pose was found."

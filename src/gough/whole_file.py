@@ -136,7 +136,7 @@ def _remove_left_behind(target: Path) -> None:
     with os.scandir(target.parent) as entries:
         left = [(entry.path, found) for entry in entries if (found := name.fullmatch(entry.name))]
     for path, found in left:
-        with suppress(OSError):  # not ours to open or delete, or gone already
+        with suppress(OSError):  # no right to open or delete it, or gone already
             if not _is_running(int(found[1])) and _is_unlocked(path):
                 os.unlink(path)
 

@@ -1,4 +1,4 @@
-"""Which combinations of the parameters an instrument can find, and the rest in words."""
+"""Combinations of the parameters that an instrument can find, and the rest in words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an instrument measures of a pose."""
+"""Quantities of a pose that an instrument measures."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Rigid:
         return cls(R, pose.position + pivot - R @ (np.zeros(3) + pivot))
 
     def pose(self) -> Pose:
-        """As a pose without pivot."""
+        """Return a pose without pivot."""
         return Pose.from_rotation(self.t, self.R)
 
     def __matmul__(self, other: Rigid) -> Rigid:

@@ -158,7 +158,7 @@ class ReadingsSensor:
         return int(np.prod(self.values.shape[1:]))
 
     def predicted(self, place, pose: Rigid) -> Array:
-        """What would be measured (n, m), the instrument placed so, at poses X (n)."""
+        """Measurements (n, m) to expect of the instrument, placed so, at poses X (n)."""
         raise NotImplementedError
 
     def sensitivity(self, place, pose: Rigid) -> tuple[Array, Array]:
@@ -170,7 +170,7 @@ class ReadingsSensor:
         return self.predicted(*a) - self.predicted(*b)
 
     def errors(self, place, pose: Rigid) -> Array:
-        """What would be measured minus what was, (n, m)."""
+        """Expected minus actual measurements, (n, m)."""
         return self.predicted(place, pose) - self.values.reshape(len(self), -1)
 
     def rows(self, parameters, values, place, legs, leg_sigma, near) -> tuple[Rows, Rigid]:

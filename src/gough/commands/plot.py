@@ -1,4 +1,4 @@
-"""gough plot: figures for reports, each a command of its own."""
+"""gough plot: figures for reports, one subcommand each."""
 
 from __future__ import annotations
 
@@ -172,9 +172,9 @@ def trajectory(
     figure = trajectory_figure(machine, envelope, time=envelope.time,
                                title=f"{machine.name}: {_name(file)}")  # fmt: skip
     code = _save(figure, machine, out, "trajectory")
-    said = note(envelope).replace("\N{MULTIPLICATION SIGN} ", "")
-    if said:
-        print(said)
+    remark = note(envelope).replace("\N{MULTIPLICATION SIGN} ", "")
+    if remark:
+        print(remark)
     return code
 
 

@@ -19,7 +19,7 @@ def linuxcnc_files(
 ) -> dict[str, str]:
     """The file of `gough export c --linuxcnc`: text by file name.
 
-    The workspace is left out: LinuxCNC has limits of its own, and a pose outside the box must not
+    The workspace is left out: LinuxCNC has its own limits, and a pose outside the box must not
     stop its position display. A pose across a singularity from home still fails.
 
     Args:

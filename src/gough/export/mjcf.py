@@ -1,6 +1,6 @@
 """MJCF: a platform as a model of MuJoCo, with its six loops closed by constraints.
 
-Each leg is a chain with joints of its own, whose rod a point constraint ties to the platform:
+Each leg is a chain with its own joints, whose rod a point constraint ties to the platform:
 
     telescopic, length change   base - two hinges - cylinder - driven slide - rod
     rotary                      base - driven hinge - arm - two hinges - rod

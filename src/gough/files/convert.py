@@ -1,4 +1,4 @@
-"""From a file of readings to a file of poses, and back, a block of rows at a time."""
+"""Conversion of a file of readings to one of poses, and back, a block of rows at a time."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ class LogFormat:
 
     @classmethod
     def of(cls, platform: str | Path, **options: Any) -> LogFormat:
-        """The `[readings]` table of a platform's file, with options in place of its entries.
+        """The `[readings]` table of a platform's file, with options instead of its entries.
 
         Args:
             platform: name in the catalog, which gives no table, or path of a .toml file.

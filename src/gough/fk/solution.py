@@ -103,8 +103,8 @@ class Solution:
         Args:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
                 else pandas. A pandas table has the row labels of that of the readings.
-            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz), in
-                place of the quaternion.
+            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz),
+                instead of the quaternion.
 
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
@@ -143,7 +143,7 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
     """The columns of `solution_names`, each with a value for every row, batch axes flattened.
 
     Args:
-        angles: Euler angles in these units in place of the quaternion.
+        angles: Euler angles in these units instead of the quaternion.
 
     Raises:
         GoughError: angles of another name.

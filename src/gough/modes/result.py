@@ -143,8 +143,8 @@ class AssemblyModes:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
                 else pandas. A pandas table has the row labels of that of the readings, each as
                 often as its readings have poses.
-            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz), in
-                place of the quaternion.
+            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz),
+                instead of the quaternion.
 
         Raises:
             GoughError: another kind or angle, or a library that is not installed.

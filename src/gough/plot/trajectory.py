@@ -77,8 +77,8 @@ class Envelope:
         self.unanswered += int(gone.sum())
         rows = np.concatenate([self._waiting, np.column_stack([x, x, gone, values, values])])
         while len(rows) >= self.width:
-            room = (self._most - len(self._bins)) * self.width
-            whole = min(room, len(rows) // self.width * self.width)
+            free = (self._most - len(self._bins)) * self.width
+            whole = min(free, len(rows) // self.width * self.width)
             self._bins = np.concatenate([self._bins, self._merge(rows[:whole], self.width)])
             rows = rows[whole:]
             if len(self._bins) == self._most:
@@ -195,9 +195,9 @@ def trajectory_figure(
         _gaps(axes, envelope)
     figure.align_ylabels(panels)
     figure.suptitle(title or platform.name)
-    said = note(envelope)
-    if said:
-        figure.text(0.99, 0.0, said, fontsize=7.5, ha="right", va="bottom", in_layout=True)
+    remark = note(envelope)
+    if remark:
+        figure.text(0.99, 0.0, remark, fontsize=7.5, ha="right", va="bottom", in_layout=True)
         panels[2].set_xlabel(label, labelpad=6)
         figure.get_layout_engine().set(rect=(0, 0.025, 1, 0.975))  # pyright: ignore[reportOptionalMemberAccess, reportCallIssue]
     return figure

@@ -82,7 +82,7 @@ def _size(found: Polished) -> Array:
 
 
 def _ended(home: HomeStruts, twist: Array) -> Polished:
-    """Where the steps from a guess end, on home's side if they can."""
+    """End of the steps from a guess, on home's side if they can."""
     finite = np.isfinite(twist).all(0)
     twist = np.where(finite, twist, 0.0)
     found = _steps(home, twist[:3], gibbs_quaternion(twist[3:]))

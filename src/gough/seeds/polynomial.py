@@ -62,7 +62,7 @@ class PolynomialSeed:
 
     @property
     def name(self) -> str:
-        """As `gough.solve` takes it."""
+        """Name that `gough.solve` takes."""
         return f"polynomial-{self.degree}" if self.degree else "home"
 
     def guess(self, legs: Array) -> Pose:

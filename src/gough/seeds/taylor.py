@@ -144,7 +144,7 @@ class HomeStruts:
         return Pose(moved + centre - platform.pivot_point, turned)
 
     def arm(self, platform: Platform, wxyz: Array) -> Array:
-        """From the platform joints' centre to the pivot after rotations (4, M, N), (3, M, N)."""
+        """Vectors (3, M, N) from the joints' centre to the pivot after rotations (4, M, N)."""
         _, centre = _joints_at_home(platform)
         r = (platform.home.position + platform.pivot_point - centre) / platform.size
         turned = cross(wxyz[1:], r[:, None, None])
@@ -165,7 +165,7 @@ class TaylorSeed:
 
     @property
     def name(self) -> str:
-        """As `solve` takes it."""
+        """Name that `gough.solve` takes."""
         return f"taylor-{self.order}"
 
     def guess(self, legs: Array) -> Pose:

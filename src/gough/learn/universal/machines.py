@@ -35,7 +35,7 @@ class Machines:
 
     @classmethod
     def at_home(cls, base: Tensor, joints: Tensor) -> Machines:
-        """From points in any frame and unit, (M, 6, 3)."""
+        """Make machines from points in any frame and unit, (M, 6, 3)."""
         points = torch.cat([base, joints], dim=1)
         size = torch.cdist(points, points).flatten(1).amax(1)[:, None, None]
         centre = joints.mean(1, keepdim=True)

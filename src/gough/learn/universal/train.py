@@ -74,7 +74,7 @@ class UniversalConfig:
 
     @classmethod
     def from_json(cls, text: str) -> UniversalConfig:
-        """From the text of `config.json`.
+        """Read the text of `config.json`.
 
         Raises:
             GoughError: not such a text.
