@@ -9,7 +9,9 @@ import documents
 import pytest
 import shell
 
-LEARNING = re.compile(r"torch|gough\.learn|gough (?:train|evaluate|dataset|inverse-network|paper)")
+LEARNING = re.compile(
+    r"torch|gough\.(?:learn|paper)|gough (?:train|evaluate|dataset|inverse-network|paper)"
+)
 
 
 def running() -> list:

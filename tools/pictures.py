@@ -8,14 +8,15 @@ Runs every `gough` line of the bash blocks of docs/plots.md in one empty folder 
 
 from __future__ import annotations
 
-import os
+import io
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 import tempfile
+from contextlib import chdir, redirect_stdout
 from pathlib import Path
+
+from gough import cli
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, IMAGES = ROOT / "docs" / "plots.md", ROOT / "docs" / "images"
@@ -31,16 +32,16 @@ def commands(page: Path = PAGE) -> list[str]:
 
 def make(images: Path = IMAGES) -> list[Path]:
     """Run the commands; returns the paths of the pictures."""
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "examples").symlink_to(ROOT / "examples")
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        Path("examples").symlink_to(ROOT / "examples")
         for line in commands():
             print(line, flush=True)
-            arguments = [sys.executable, "-m", "gough.cli", *shlex.split(line)[1:]]
-            done = subprocess.run(
-                arguments, check=False, cwd=folder, env=os.environ, capture_output=True, text=True
-            )
-            if done.returncode:
-                raise SystemExit(f"exit code {done.returncode}: {line}\n{done.stderr}")
+            try:
+                with redirect_stdout(io.StringIO()):
+                    cli.main(shlex.split(line)[1:])
+            except SystemExit as end:
+                if end.code:
+                    raise SystemExit(f"exit code {end.code}: {line}") from None
         made = sorted(Path(folder).glob("*.svg"))
         return [Path(shutil.copy(picture, images / picture.name)) for picture in made]
 

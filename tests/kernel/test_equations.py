@@ -16,33 +16,33 @@ from gough.kinematics import equivalent_struts
 CATALOG = gough.Platform.catalog()
 
 
-@jit(cache=False)
+@jit()
 def _eliminate(A, b):
     rows = [(A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5], b[i]) for i in range(6)]
     return eliminate(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
 
 
-@jit(cache=False)
+@jit()
 def _newton_step(constants, buffer):
     newton_step(constants, buffer, layout.FIRST, layout.SINGLE)
 
 
-@jit(cache=False)
+@jit()
 def _put_reading(constants, legs, buffer):
     return put_reading(constants, legs, layout.FIRST, buffer, layout.FIRST, layout.SINGLE)
 
 
-@jit(cache=False)
+@jit()
 def _pivoted_solve(J, r, system, step):
     return linear.pivoted_solve(J, r, system, step)
 
 
-@jit(cache=False)
+@jit()
 def _damped_solve(J, r, damping, system, step):
     return linear.damped_solve(J, r, damping, system, step)
 
 
-@jit(cache=False)
+@jit()
 def _smallest_singular_value(J, system):
     return linear.smallest_singular_value(J, system)
 
