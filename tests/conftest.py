@@ -33,5 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         names = getattr(item, "fixturenames", ())
         if "browser" in names:
             item.add_marker("browser")
+        if "built" in names:  # by a C compiler
+            item.add_marker("process")
         if item.path.parent.name in ("learn", "paper"):
             item.add_marker("torch")

@@ -7,7 +7,7 @@ import machines
 import numpy as np
 import pytest
 import support
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import gough
@@ -47,7 +47,7 @@ def _around(platform: Platform, count: int, seed: int, width=0.4, angle=120.0) -
     return pose[np.all(np.isfinite(gough.leg_lengths(platform, pose)), axis=-1)]
 
 
-@settings(max_examples=20)
+@support.at_most(20)
 @given(support.seeds, st.sampled_from(["telescopic", "length_change", "rotary"]))
 def test_the_compiled_rule_is_the_plain_one(seed, legs) -> None:
     platform = machines.random_platform(seed, legs, sensors=True)
@@ -75,7 +75,7 @@ def test_the_same_sign_is_not_enough() -> None:
     assert not np.any(ours & ~same)
 
 
-@settings(max_examples=12)
+@support.at_most(12)
 @given(support.seeds, st.floats(0.3, 3.0))
 def test_a_workspace_never_makes_answers_worse(seed, share) -> None:
     """With any box, stated or not, the same poses are usable."""

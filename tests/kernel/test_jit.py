@@ -51,16 +51,17 @@ def test_a_changed_source_never_runs_old_code(tmp_path):
 
 
 def test_what_compiled_code_depends_on(monkeypatch, tmp_path):
-    """The stamp changes with the function's folder, the kernel's folder and the statuses alone."""
-    kernel, statuses = Path(jit_module.__file__).parent, Path(jit_module.status.__file__)
+    """The function's folder, the kernel's, the statuses and the steps of `home_mode`, no more."""
+    kernel = Path(jit_module.__file__).parent
+    sources = [tmp_path, kernel, kernel.parent / "status.py", kernel.parent / "home_mode.py"]
     asked = []
     monkeypatch.setattr(jit_module, "_digest", lambda path: asked.append(path) or str(path))
 
     file = SimpleNamespace(_source_stamp="own")
     compiled = SimpleNamespace(_cache=SimpleNamespace(_cache_file=file))
     jit_module._expire_with_sources(compiled, tmp_path)
-    assert file._source_stamp == ("own", str(tmp_path), str(kernel), str(statuses))
-    assert asked == [tmp_path, kernel, statuses]
+    assert file._source_stamp == ("own", *map(str, sources))
+    assert asked == sources
 
 
 def test_a_digest_is_of_every_source_in_a_folder(tmp_path):
