@@ -23,18 +23,14 @@ def test_monomials_are_all_there_once(degree):
     """Their values at a point with prime coordinates are all different and all products."""
     rng = np.random.default_rng(0)
     u = rng.uniform(0.5, 1.5, size=(1, 6))
-    parent, _, starts = polynomial.monomials(degree)
     values = polynomial._terms(u, degree)[0]
-    real = values[values != 0]
-    assert len(real) == polynomial.count(degree)
-    assert len(np.unique(np.round(real, 12))) == len(real)
-    assert starts[-1] == len(parent)
-    assert np.all(np.diff(starts) % 2 == 0)
+    assert len(values) == polynomial.count(degree)
+    assert len(np.unique(np.round(values, 12))) == len(values)
     # the sum over all monomials up to a degree is a coefficient of a generating function
     series = np.array([1.0])
     for x in u[0]:
         series = np.convolve(series, x ** np.arange(degree + 1))[: degree + 1]
-    assert np.sum(real) == pytest.approx(series.sum(), rel=1e-12)
+    assert np.sum(values) == pytest.approx(series.sum(), rel=1e-12)
 
 
 @pytest.mark.parametrize(("degree", "shift"), [(3, 1.51), (4, 0.747), (5, 0.433)])
@@ -67,7 +63,6 @@ def test_the_compiled_evaluation_is_the_plain_one(degree, offset):
     legs = scaling[0] + rng.uniform(-1, 1, size=(150, 6)) / scaling[1]
     made = polynomial.Polynomial(coefficients, scaling, np.append(reference, offset), degree)
     terms = polynomial._terms((legs - scaling[0]) * scaling[1], degree)
-    coefficients[~terms.any(axis=0)] = 0  # the padding
     values = terms @ coefficients
     u = values[:, 3:]
     turn = np.column_stack([offset + np.sqrt(1 - np.sum(u**2, axis=1)), u])
@@ -100,7 +95,6 @@ def test_a_polynomial_is_reproduced_exactly():
     u = rng.uniform(-1, 1, size=(3_000, 6))
     truth = rng.normal(size=(len(polynomial.monomials(3)[0]), 6))
     terms = polynomial._terms(u, 3)
-    truth[~terms.any(axis=0)] = 0
     found = polynomial._least_squares(u, terms @ truth, 3)
     np.testing.assert_allclose(found, truth, atol=1e-11)
 

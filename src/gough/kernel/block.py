@@ -13,6 +13,7 @@ import numpy as np
 
 from gough.kernel.equations import SETTLED, assess, newton_step
 from gough.kernel.jit import inline, jit
+from gough.kernel.lanes import LANES
 from gough.kernel.layout import (
     COUNT,
     GAIN,
@@ -21,6 +22,7 @@ from gough.kernel.layout import (
     OPEN,
     ORDER,
     PER_SIZE,
+    QUATERNION,
     REGULAR,
     RESIDUAL,
     ROTARY,
@@ -30,37 +32,58 @@ from gough.kernel.layout import (
     WIDTH,
     ZERO,
 )
+from gough.kernel.polynomial import POSE, READING, guess_poses
 from gough.kernel.pose_io import get_pose, in_stroke, put_pose, put_reading, put_user_position
 from gough.kernel.rows import CONVERGED, INVALID_INPUT, OUTSIDE_STROKE
 
 
 @jit()
-def solve_blocks(constants, legs, guess, tolerance, steps, first, last, work, out):
+def solve_blocks(constants, legs, guess, polynomial, tolerance, steps, first, last, work, out):
     """Solve rows first..last of legs (N, 6) by plain Newton.
 
     Args:
-        guess: (last - first, 7) internal poses to start from.
+        guess: (last - first, 7) internal poses to start from; none: the polynomial's.
+        polynomial: numbers and table, see `gough.kernel.polynomial`.
         tolerance: largest strut error, as a share of the platform's size.
         steps: limit of Newton steps.
-        work: (COMPONENTS WIDTH,), (6 WIDTH,) and (WIDTH,) to work in.
+        work: (COMPONENTS WIDTH,), (6 WIDTH,), (WIDTH,) and what a polynomial's evaluation takes,
+            to work in.
         out: position (N, 3), wxyz (N, 4), residual (N,) [platform unit], iterations (N,),
             status (N,), which is OPEN where the row needs the row solver.
 
     Returns:
         How many of the rows are open or invalid.
     """
-    buffer, readings, valid = work
+    buffer, readings, valid, z = work
     for k in range(WIDTH):  # puts the base joints, which most machines never move
         put_reading(constants, legs, first, buffer, k, WIDTH)
     troubled = 0
     for start in range(first, last, WIDTH):
         _load(constants, legs, start, last, readings, buffer, valid)
-        for k in range(WIDTH):
-            row = start + k if start + k < last else last - 1
-            put_pose(buffer, k, WIDTH, guess, row - first)
+        if len(guess) == 0:
+            _guess(polynomial, readings, z, buffer)
+        else:
+            for k in range(WIDTH):
+                row = start + k if start + k < last else last - 1
+                put_pose(buffer, k, WIDTH, guess, row - first)
         _refine(constants, buffer, tolerance, steps)
         troubled += _store(constants, buffer, legs, valid, start, last, tolerance, out)
     return troubled
+
+
+@inline
+def _guess(polynomial, readings, z, buffer):
+    """Store the poses that a polynomial gives for a block's readings."""
+    numbers, table = polynomial
+    for first in range(0, WIDTH, LANES):
+        for leg in range(6):
+            for w in range(LANES):
+                z[(READING + leg) * LANES + w] = readings[leg * WIDTH + first + w]
+        guess_poses(z, numbers, table)
+        for c in range(7):
+            at = (c if c < 3 else QUATERNION + c - 3) * WIDTH + first
+            for w in range(LANES):
+                buffer[at + w] = z[(POSE + c) * LANES + w]
 
 
 @inline

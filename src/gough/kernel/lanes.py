@@ -40,8 +40,7 @@ class Reals:
         if isinstance(a, Complexes) or isinstance(b, Complexes):
             return NotImplemented  # which knows how to
         a, b = (
-            x.value if isinstance(x, Reals) else ir.Constant(_VECTOR, [float(x)] * LANES)
-            for x in (a, b)
+            x.value if isinstance(x, Reals) else _constant(x) for x in (a, b)
         )
         return Reals(self.builder, getattr(self.builder, instruction)(a, b, flags=_FLAGS))
 
@@ -77,14 +76,19 @@ class Reals:
 
     def larger(self, other):
         """The larger of each two; `other` where they do not compare."""
-        above = self.builder.fcmp_ordered(">", self.value, other.value)
-        return Reals(self.builder, self.builder.select(above, self.value, other.value))
+        other = other.value if isinstance(other, Reals) else _constant(other)
+        above = self.builder.fcmp_ordered(">", self.value, other)
+        return Reals(self.builder, self.builder.select(above, self.value, other))
 
     def _call(self, name: str) -> Reals:
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
         full = f"llvm.{name}.v{LANES}f64"
         function = cgutils.get_or_insert_function(self.builder.module, kind, full)
         return Reals(self.builder, self.builder.call(function, [self.value]))
+
+
+def _constant(number: float) -> Any:
+    return ir.Constant(_VECTOR, [float(number)] * LANES)
 
 
 class Complexes:
@@ -162,7 +166,7 @@ class _Slots:
 
 
 class _Index:
-    """The index of a loop of the machine's, times a number, plus another."""
+    """A whole number that the machine finds, times a number, plus another."""
 
     def __init__(self, value: Any, scale: int = 1, offset: int = 0) -> None:
         self.value, self.scale, self.offset = value, scale, offset
@@ -185,16 +189,43 @@ def loop(z: Any, count: int) -> Iterator[Any]:
         yield _Index(running.index)
 
 
-def compiled(function: Callable[[Any, Any], None], kind: type) -> Callable[..., None]:
+def rows(z: Any, table: Any) -> Iterator[tuple[Any, list[Any]]]:
+    """The rows of a table of whole numbers, numbered from 0; traced as `loop` is."""
+    if not isinstance(z, _Slots):
+        yield from enumerate(table)
+        return
+    builder = z.builder
+    with cgutils.for_range(builder, builder.extract_value(table.shape, 0)) as running:
+        first = builder.mul(running.index, running.index.type(2))
+        places = (builder.add(first, first.type(k)) for k in range(2))
+        yield (
+            _Index(running.index),
+            [_Index(builder.load(builder.gep(table.data, [place]))) for place in places],
+        )
+
+
+def registers(z: Any, count: int) -> Any:
+    """Return slots of real numbers that are kept in registers, also through a loop."""
+    if not isinstance(z, _Slots):
+        return [0.0] * count
+    data = cgutils.alloca_once(z.builder, _DOUBLE, size=count * LANES)
+    return _Slots(z.builder, data, Reals, shared=False)
+
+
+def compiled(function: Callable[..., None], kind: type, table: bool = False) -> Callable[..., None]:
     """Return `function` as a function of compiled code.
 
     Args:
         function: of z and shared, both indexed by slots; it writes its results into z.
         kind: `Reals` or `Complexes`, what a slot holds.
+        table: it takes a table (M, 2) of whole numbers, too, for `rows`.
 
     Returns:
-        A function of two contiguous float64 arrays, for use in jitted functions.
+        A function of two contiguous float64 arrays, for use in jitted functions, and of an int64
+        array if there is a table.
     """
+    if table:
+        return intrinsic(_with_table(function, kind))
 
     def typed(typingctx, z, shared):
         def codegen(context, builder, sig, args):
@@ -208,6 +239,22 @@ def compiled(function: Callable[[Any, Any], None], kind: type) -> Callable[..., 
         return types.void(z, shared), codegen
 
     return intrinsic(typed)
+
+
+def _with_table(function: Callable[[Any, Any, Any], None], kind: type) -> Callable[..., Any]:
+    def typed(typingctx, z, shared, table):
+        def codegen(context, builder, sig, args):
+            first, second, third = (
+                context.make_array(array)(context, builder, value)
+                for array, value in zip(sig.args, args, strict=True)
+            )
+            slots = _Slots(builder, first.data, kind, False)
+            function(slots, _Slots(builder, second.data, kind, True), third)
+            return context.get_dummy_value()
+
+        return types.void(z, shared, table), codegen
+
+    return typed
 
 
 def larger(a: Any, b: Any) -> Any:

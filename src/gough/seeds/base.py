@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from gough.kernel.constants import kernel_constants, to_internal
 from gough.kinematics import singularity_distance
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.seeds.polynomial import DEGREE, PolynomialSeed
+from gough.seeds.polynomial import DEGREE, Polynomial, PolynomialSeed, fitted
 from gough.seeds.taylor import SINGULAR, TaylorSeed
 from gough.workspace import Workspace
 
@@ -32,19 +32,6 @@ class Seed(Protocol):
 
     def guess(self, legs: Array) -> Pose:
         """Poses, batch (N,), for readings (N, 6); finite for finite readings."""
-        ...
-
-
-class KernelSeed(Seed, Protocol):
-    """A seed so fast that the solver has it guess part by part, on each of its threads."""
-
-    @property
-    def platform(self) -> Platform:
-        """The machine whose internal poses `kernel_poses` gives."""
-        ...
-
-    def kernel_poses(self, legs: Array) -> Array:
-        """The poses of `guess` in the solver's internal form, (N, 7)."""
         ...
 
 
@@ -74,26 +61,37 @@ class PoseSeed:
         )
 
 
-Start = Callable[[Any], Array]  # internal poses (K, 7) of K rows, by a slice or indices
+@dataclass(frozen=True, eq=False)
+class Start:
+    """First guesses for a batch, in the compiled code's form.
+
+    Attributes:
+        legs: readings (N, 6).
+        poses: (N, 7) internal poses; None where the compiled code evaluates the polynomial.
+        polynomial: what it evaluates then.
+    """
+
+    legs: Array
+    poses: Array | None
+    polynomial: Polynomial
+
+    def of(self, rows: Any) -> Array:
+        """Return internal poses (K, 7) of some rows, a slice or indices (K,)."""
+        return self.polynomial(self.legs[rows]) if self.poses is None else self.poses[rows]
 
 
 def starting_poses(platform: Platform, seed: Seed, legs: Array) -> Start:
-    """Return a function that gives the internal poses (K, 7) that K rows start from.
+    """Return the internal poses that readings (N, 6) start from, or the polynomial of them.
 
-    A `KernelSeed` of this platform guesses when the function is called, any other now.
-
-    Args:
-        legs: readings (N, 6). The function takes a slice or indices (K,) of its rows.
+    Poses that are not finite become home.
     """
-    kernel_poses = getattr(seed, "kernel_poses", None)
-    if kernel_poses is not None and cast(KernelSeed, seed).platform == platform:
-        return lambda rows: kernel_poses(legs[rows])
+    if isinstance(seed, PolynomialSeed) and seed.platform == platform:
+        return Start(legs, None, seed.polynomial)
     constants = kernel_constants(platform)
     poses = to_internal(constants, seed.guess(legs))
     bad = ~np.all(np.isfinite(poses), axis=-1)
     poses[bad] = constants[layout.HOME_POSE :][:7]
-    poses = np.ascontiguousarray(poses)
-    return lambda rows: poses[rows]
+    return Start(legs, np.ascontiguousarray(poses), fitted(platform, 0))
 
 
 def find_seed(platform: Platform, seed: str | Seed | Pose, *, guess_only: bool = False) -> Seed:

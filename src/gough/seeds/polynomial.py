@@ -16,13 +16,15 @@ from math import comb
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough import quaternion
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.kernel import layout
 from gough.kernel.constants import from_internal, kernel_constants, to_internal
-from gough.kernel.polynomial import evaluate
+from gough.kernel.lanes import LANES
+from gough.kernel.polynomial import MONOMIAL, evaluate
 from gough.kinematics import assembly_sign, leg_lengths
 from gough.platform import Platform
 from gough.pose import Pose
@@ -34,7 +36,7 @@ SAMPLES_PER_MONOMIAL = 100
 MINIMUM_SAMPLES = 20_000
 CHUNK = 4096  # samples whose terms are in memory at a time
 LARGEST_SINE = np.sin(np.radians(85))  # of a fitted rotation, up to which its sine is fitted
-VERSION = 2  # of the fit: raise it when polynomials on disk are no longer right
+VERSION = 3  # of the fit: raise it when polynomials on disk are no longer right
 
 
 class PolynomialSeed:
@@ -45,7 +47,7 @@ class PolynomialSeed:
     Example:
         >>> seed = gough.PolynomialSeed(gough.Platform.load("reference"), 5)
         >>> seed.name, seed.polynomial.coefficients.shape
-        ('polynomial-5', (464, 6))
+        ('polynomial-5', (462, 6))
     """
 
     def __init__(self, platform: Platform, degree: int = DEGREE) -> None:
@@ -67,13 +69,7 @@ class PolynomialSeed:
 
     def guess(self, legs: Array) -> Pose:
         """Poses, batch (N,), for readings (N, 6)."""
-        return from_internal(kernel_constants(self.platform), self.kernel_poses(legs))
-
-    def kernel_poses(self, legs: Array) -> Array:
-        """The same poses in the solver's internal form, (N, 7)."""
-        if not (legs.flags.c_contiguous and legs.flags.writeable):
-            legs = legs.copy()  # compiled code is made for such arrays alone
-        return self.polynomial(legs)
+        return from_internal(kernel_constants(self.platform), self.polynomial(legs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,23 +92,22 @@ class Polynomial:
     degree: int
 
     def __call__(self, legs: Array) -> Array:
-        """Internal poses (N, 7) for readings (N, 6), which are contiguous."""
+        """Internal poses (N, 7) for readings (N, 6)."""
+        if not (legs.flags.c_contiguous and legs.flags.writeable):
+            legs = legs.copy()  # compiled code is made for such arrays alone
         out = np.empty((len(legs), 7))
-        width = 6 * layout.WIDTH
-        work = np.empty(width), np.empty(width), np.empty(self._work_size)
-        evaluate(self._arrays, legs, work, out)
+        evaluate(*self.arrays, legs, self.scratch(), out)
         return out
 
     @cached_property
-    def _arrays(self) -> tuple:
-        """Arguments of the compiled code; see `gough.kernel.polynomial.evaluate`."""
-        table = (array.astype(np.uint64) for array in monomials(self.degree))
-        parent, variable, starts = table
-        return self.coefficients, parent, variable, self.scaling, starts, self.turn
+    def arrays(self) -> tuple[Array, NDArray[np.int64]]:
+        """Arguments of the compiled code; see `gough.kernel.polynomial`."""
+        flat = np.concatenate([self.scaling.ravel(), self.turn, self.coefficients.ravel()])
+        return flat, np.stack(monomials(self.degree), axis=1)[1:].copy()
 
-    @cached_property
-    def _work_size(self) -> int:
-        return int(2 * layout.WIDTH * np.max(np.diff(monomials(self.degree)[2])))
+    def scratch(self) -> Array:
+        """Return an array for the compiled code to work in."""
+        return np.empty((MONOMIAL + len(self.coefficients)) * LANES)
 
 
 def count(degree: int) -> int:
@@ -121,25 +116,22 @@ def count(degree: int) -> int:
 
 
 @lru_cache
-def monomials(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def monomials(degree: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """All monomials of six variables up to `degree`, degree by degree.
 
     Returns:
-        parent (M,): which monomial of the degree below each is a multiple of, counted within
-        that degree; variable (M,): by which of the six; starts (degree + 2,): where each degree
-        begins, and the end. The compiled loop takes two at a time, so a degree with an odd
-        number of monomials is padded by one, whose coefficient is zero.
+        parent (M,): the monomial, one degree lower, that each is a multiple of; variable (M,):
+        by which of the six. The first is 1, and has none.
     """
-    parent, variable, starts = [0, 0], [0, 0], [0, 2]
-    level: list[tuple[int, ...]] = [()]
+    parent, variable = [0], [0]
+    level: dict[tuple[int, ...], int] = {(): 0}  # of one degree, and where each is
     for total in range(1, degree + 1):
-        index = {e: i for i, e in enumerate(level)}
-        level = list(combinations_with_replacement(range(6), total))
-        padding = [0] * (len(level) % 2)
-        parent += [index[e[:-1]] for e in level] + padding
-        variable += [e[-1] for e in level] + padding
-        starts.append(len(parent))
-    return np.array(parent), np.array(variable), np.array(starts)
+        factors = list(combinations_with_replacement(range(6), total))
+        places = {e: len(parent) + i for i, e in enumerate(factors)}
+        parent += [level[e[:-1]] for e in factors]
+        variable += [e[-1] for e in factors]
+        level = places
+    return np.array(parent, np.int64), np.array(variable, np.int64)
 
 
 @lru_cache(maxsize=64)
@@ -158,7 +150,7 @@ def fitted(platform: Platform, degree: int) -> Polynomial:
 def constant(platform: Platform) -> Polynomial:
     """Degree 0: home, whatever the readings."""
     home = kernel_constants(platform)[layout.HOME_POSE :][:7]
-    coefficients = np.zeros((2, 6))
+    coefficients = np.zeros((1, 6))
     coefficients[0, :3] = home[:3]
     scaling = np.stack([platform.home_legs, np.ones(6)])
     return Polynomial(coefficients, scaling, np.append(home[3:], 1.0), 0)
@@ -229,14 +221,11 @@ def _least_squares(u: Array, wanted: Array, degree: int) -> Array:
 
 
 def _terms(u: Array, degree: int) -> Array:
-    """Values of all monomials, (N, M); the padding is zero."""
-    parent, variable, starts = monomials(degree)
-    terms = np.zeros((len(u), len(parent)))
-    terms[:, 0] = 1.0
-    for d in range(1, degree + 1):
-        below, first = starts[d - 1], starts[d]
-        for m in range(first, first + comb(5 + d, d)):
-            np.multiply(terms[:, below + parent[m]], u[:, variable[m]], out=terms[:, m])
+    """Values of all monomials, (N, M)."""
+    parent, variable = monomials(degree)
+    terms = np.ones((len(u), len(parent)))
+    for m in range(1, len(parent)):
+        np.multiply(terms[:, parent[m]], u[:, variable[m]], out=terms[:, m])
     return terms
 
 
@@ -259,7 +248,7 @@ def _read(path: Path, degree: int) -> Polynomial | None:
             arrays = file["coefficients"], file["scaling"], file["turn"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    if [a.shape for a in arrays] != [(len(monomials(degree)[0]), 6), (2, 6), (5,)]:
+    if [a.shape for a in arrays] != [(count(degree), 6), (2, 6), (5,)]:
         return None
     return Polynomial(*arrays, degree) if all(np.all(np.isfinite(a)) for a in arrays) else None
 
