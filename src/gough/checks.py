@@ -23,6 +23,37 @@ def as_batch(name: str, value: ArrayLike, trailing: tuple[int, ...]) -> Array:
     return array
 
 
+def as_number(
+    name: str, value: object, *, above: float = -np.inf, low: float = -np.inf, high: float = np.inf
+) -> float:
+    """Return one real number as a float.
+
+    Args:
+        above, low, high: it must be greater than the first, and from the second to the third.
+
+    Raises:
+        GoughError: something else.
+    """
+    if _is_number(value) and (value > above) & (low <= value) & (value <= high):  # pyright: ignore
+        return float(value)  # pyright: ignore[reportArgumentType]
+    wanted = f"a number above {above:g}" if above > -np.inf else "a number"
+    wanted = f"{low:g} to {high:g}" if abs(low) < np.inf and abs(high) < np.inf else wanted
+    raise GoughError(f"{name}: expected {wanted}, found {reprlib.repr(value)}")
+
+
+def as_whole(name: str, value: object, *, low: int, high: int | None = None) -> int:
+    """Return one whole number as an int; 3.0 is one.
+
+    Raises:
+        GoughError: something else, or a number below `low` or above `high`.
+    """
+    good = _is_number(value) and value == value // 1 and value >= low  # pyright: ignore
+    if good and (high is None or value <= high):  # pyright: ignore[reportOperatorIssue]
+        return int(value)  # pyright: ignore[reportArgumentType]
+    wanted = f"of at least {low}" if high is None else f"from {low} to {high:,}"
+    raise GoughError(f"{name}: expected a whole number {wanted}, found {reprlib.repr(value)}")
+
+
 def frozen(array: Array) -> Array:
     """Make an array read-only and return it."""
     array.flags.writeable = False

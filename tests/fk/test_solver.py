@@ -95,6 +95,8 @@ def test_whole_numbers_are_as_good_as_others():
     before = len(solve_rows.signatures)  # pyright: ignore[reportFunctionMemberAccess]
     solver = gough.Solver(platform, tolerance=1, singular=0, max_iterations=3.0)  # pyright: ignore
     assert solver(platform.home_legs).status == Status.CONVERGED
+    gough.Solver(platform, tolerance=0)(platform.home_legs)
+    gough.Tracker(platform, tolerance=1, singular=0, start=platform.home).update(platform.home_legs)
     gough.solve(platform, np.asfortranarray(np.tile(platform.home_legs, (3, 1))))
     assert len(solve_rows.signatures) == before  # pyright: ignore[reportFunctionMemberAccess]
 
@@ -109,3 +111,30 @@ def test_a_polynomial_of_another_machine_guesses_for_that_machine():
     legs = gough.leg_lengths(reference, reference.sample_poses(5))
     guess = gough.solve(moved, legs, seed=seed, max_iterations=0).pose
     assert guess.distance(seed.guess(legs))[0].max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "wanted"),
+    [
+        ("workers", "2", "a whole number from 1 to 10,000, found '2'"),
+        ("workers", 0, "a whole number from 1 to 10,000, found 0"),
+        ("workers", -1, "a whole number from 1 to 10,000, found -1"),
+        ("workers", 1.5, "a whole number from 1 to 10,000, found 1.5"),
+        ("max_iterations", None, "a whole number from 0 to 10,000, found None"),
+        ("max_iterations", 2.5, "a whole number from 0 to 10,000, found 2.5"),
+        ("restarts", True, "a whole number from 0 to 10,000, found True"),
+        ("restarts", float("inf"), "a whole number from 0 to 10,000, found inf"),
+        ("tolerance", -1.0, "0 to 1, found -1.0"),
+        ("tolerance", "tight", "0 to 1, found 'tight'"),
+        ("singular", float("nan"), "0 to 1, found nan"),
+    ],
+)
+def test_settings_out_of_range_are_refused(name, value, wanted):
+    with pytest.raises(gough.GoughError, match=f"^{name}: expected {wanted}$"):
+        gough.Solver("reference", **{name: value})  # pyright: ignore[reportArgumentType]
+
+
+def test_a_very_long_name_is_only_unknown():
+    with pytest.raises(gough.GoughError, match="seed: unknown name 'nnn") as error:
+        gough.Solver("reference", "n" * 5_000)
+    assert len(str(error.value)) < 400

@@ -226,10 +226,21 @@ def test_what_is_no_reading_at_all_raises(reference, legs):
     assert tracker.status == Status.CONVERGED
 
 
-@pytest.mark.parametrize("name", ["max_shift", "max_turn", "confirm"])
-def test_limits_must_be_above_zero(reference, name):
-    with pytest.raises(gough.GoughError, match=f"{name}: expected a number above 0, found -1"):
-        gough.Tracker(reference, **{name: -1})  # pyright: ignore[reportArgumentType]
+@pytest.mark.parametrize(
+    ("name", "value", "wanted"),
+    [
+        ("max_shift", -1, "a number above 0, found -1"),
+        ("max_turn", -1, "a number above 0, found -1"),
+        ("period", "1", "a number above 0, found '1'"),
+        ("confirm", -1, "a whole number of at least 1, found -1"),
+        ("confirm", 1.5, "a whole number of at least 1, found 1.5"),
+        ("start", gough.Pose(np.zeros((2, 3)), [[1.0, 0, 0, 0]] * 2), r"one Pose, found batch"),
+        ("start", gough.Pose([np.nan] * 3, [1.0, 0, 0, 0]), "a pose of finite numbers"),
+    ],
+)
+def test_settings_out_of_range_are_refused(reference, name, value, wanted):
+    with pytest.raises(gough.GoughError, match=f"{name}: expected {wanted}"):
+        gough.Tracker(reference, **{name: value})  # pyright: ignore[reportArgumentType]
 
 
 def test_every_event_has_a_sentence():

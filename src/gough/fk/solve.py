@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gough.checks import Array
-from gough.errors import GoughError
+from gough.checks import Array, as_number, as_whole
 from gough.fk.solution import Solution
 from gough.kernel.constants import SINGULAR, kernel_constants
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
@@ -27,7 +26,8 @@ if TYPE_CHECKING:
     from gough.fk.tracker import Tracker
 
 FEW = 1_024  # rows that the row solver takes without the block solver, which compiles longer
-LIMITS = {"tolerance": 1.0, "max_iterations": 10_000, "restarts": 10_000, "singular": 1.0}
+NO_POSES = np.empty((0, 7))
+MOST_STEPS, MOST_STARTS, MOST_WORKERS = 10_000, 10_000, 10_000
 
 
 def solve(
@@ -154,18 +154,19 @@ class Solver:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "platform", as_platform(self.platform))
-        for name, high in LIMITS.items():
-            value = getattr(self, name)
-            if not 0 <= value <= high:
-                raise GoughError(f"{name}: expected 0 to {high:g}, found {value!r}")
+        given = vars(self)  # a frozen dataclass is set through its dictionary
+        given["platform"] = as_platform(self.platform)
+        for name in ("tolerance", "singular"):
+            given[name] = as_number(name, given[name], low=0.0, high=1.0)
+        for name, most in (("max_iterations", MOST_STEPS), ("restarts", MOST_STARTS)):
+            given[name] = as_whole(name, given[name], low=0, high=most)
+        if self.workers is not None:
+            given["workers"] = as_whole("workers", self.workers, low=1, high=MOST_WORKERS)
         seed: str | Seed | Pose = self.seed
         if self.frame is not None:
             view = self.platform.frame(self.frame)
             seed = view.platform_pose(seed) if isinstance(seed, Pose) else seed
-        object.__setattr__(
-            self, "seed", find_seed(self.platform, seed, guess_only=not self.max_iterations)
-        )
+        given["seed"] = find_seed(self.platform, seed, guess_only=not self.max_iterations)
 
     def __call__(
         self,
@@ -264,13 +265,16 @@ class Solver:
         from gough.kernel.block import solve_blocks
 
         constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
-        tolerance = float(self.tolerance)
-        steps = min(int(self.max_iterations), int(STEPS))
+        steps = min(self.max_iterations, int(STEPS))
+        polynomial = start.polynomial
 
         def work(first: int, last: int) -> int:
             scratch = np.zeros(COMPONENTS * WIDTH), np.empty(6 * WIDTH), np.empty(WIDTH)
-            guess = start(slice(first, last))
-            return solve_blocks(constants, legs, guess, tolerance, steps, first, last, scratch, out)
+            guess = NO_POSES if start.poses is None else start.poses[first:last]
+            return solve_blocks(
+                constants, legs, guess, polynomial.arrays, self.tolerance, steps, first, last,
+                (*scratch, polynomial.scratch()), out,
+            )  # fmt: skip
 
         troubled = in_parts(work, len(legs), self.workers)
         if troubled:
@@ -286,7 +290,7 @@ class Solver:
         Returns how many are invalid.
         """
         constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
-        starts = further_starts(self.platform, int(self.restarts) if self.max_iterations else 0)
+        starts = further_starts(self.platform, self.restarts if self.max_iterations else 0)
         # a given pose says which assembly mode is meant
         stays = float(isinstance(self.seed, PoseSeed))
         settings = np.array([self.tolerance, self.max_iterations, self.singular, stays], float)
@@ -294,7 +298,7 @@ class Solver:
         def work(first: int, last: int) -> int:
             some = chosen[first:last]
             scratch = np.zeros(COMPONENTS), np.zeros(COMPONENTS), np.zeros((4, 6, 6))
-            return solve_rows(constants, legs, some, start(some), starts, settings, scratch, out)
+            return solve_rows(constants, legs, some, start.of(some), starts, settings, scratch, out)
 
         return in_parts(work, len(chosen), self.workers, chunk=part, serial=part)
 

@@ -9,13 +9,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gough import quaternion, velocities
-from gough.checks import Array
+from gough.checks import Array, as_number, as_whole
 from gough.errors import GoughError
 from gough.fk.solution import Solution
 from gough.fk.solve import Rows, Solver
 from gough.kernel import layout
 from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
-from gough.kernel.cycle import BAD_READING, CROSSED, FAILED, OURS, SIGN, STATE, cycle
+from gough.kernel.cycle import (
+    BAD_READING,
+    CROSSED,
+    FAILED,
+    LAST_POSITION,
+    LAST_WXYZ,
+    OURS,
+    SIGN,
+    STATE,
+    cycle,
+)
 from gough.kinematics import assembly_sign, pose_covariance
 from gough.platform import Platform, as_platform
 from gough.pose import Pose, pose_cells
@@ -77,25 +87,24 @@ class Tracker:
             period: time of one cycle [s], for `twist`; unless given, rates are per cycle.
 
         Raises:
-            GoughError: a limit that is not above zero.
+            GoughError: a limit that is not above zero, or a start that is not one pose.
         """
         platform = as_platform(platform)
         self.platform = platform
         self._solver = Solver(platform, tolerance=tolerance, singular=singular, workers=1)
-        self._max_shift = 0.02 * platform.size if max_shift is None else max_shift
-        self._max_turn, self._confirm, self._period = max_turn, confirm, period
-        limits = {"max_shift": self._max_shift, "max_turn": max_turn, "confirm": confirm}
-        limits["period"] = period
-        for name, value in limits.items():
-            if not value > 0:
-                raise GoughError(f"{name}: expected a number above 0, found {value!r}")
-        self._constants = kernel_constants(platform, singular)
-        self._limits = np.array([tolerance, singular, 0.0, 0.0])
+        shift = 0.02 * platform.size if max_shift is None else max_shift
+        self._max_shift = as_number("max_shift", shift, above=0.0)
+        self._max_turn = as_number("max_turn", max_turn, above=0.0)
+        self._confirm = as_whole("confirm", confirm, low=1)
+        self._period = as_number("period", period, above=0.0)
+        if start is not None:
+            _check_start(start)
+        self._constants = kernel_constants(platform, self._solver.singular)
+        self._limits = np.array([self._solver.tolerance, self._solver.singular, 0.0, 0.0])
         self._legs = platform.home_legs[None].copy()
         self._state = np.zeros((1, STATE))
         self._buffer, self._work = np.zeros(layout.COMPONENTS), np.zeros((4, 6, 6))
         self._position, self._wxyz = np.zeros((1, 3)), np.zeros((1, 4))
-        self._last_position, self._last_wxyz = np.zeros((1, 3)), np.zeros((1, 4))
         self._elapsed = 1  # cycles since the last pose
         self._rates: ArrayLike | None = None
         self._missed, self._agreeing = 0, 0
@@ -130,8 +139,9 @@ class Tracker:
             return np.full(6, np.nan)
         if self._rates is not None:
             return velocities.twist(self.platform, self.pose, self._rates)
-        turn = quaternion.product(self._wxyz[0], quaternion.conjugate(self._last_wxyz[0]))
-        moved = self._position[0] - self._last_position[0]
+        last = self._state[0, LAST_POSITION:LAST_WXYZ], self._state[0, LAST_WXYZ:]
+        turn = quaternion.product(self._wxyz[0], quaternion.conjugate(last[1]))
+        moved = self._position[0] - last[0]
         motion = np.concatenate([moved, quaternion.to_rotation_vector(turn)])
         return motion / (self._period * self._elapsed)
 
@@ -155,7 +165,6 @@ class Tracker:
         except (TypeError, ValueError) as error:
             raise GoughError(f"legs: expected six numbers, found {reprlib.repr(legs)}") from error
         self._rates, self._elapsed = leg_rates, self._missed + 1
-        self._last_position[:], self._last_wxyz[:] = self._position, self._wxyz
         code = FAILED if self._lost else self._run_cycle()
         if code >= layout.OPEN:
             self._recover(code)
@@ -191,13 +200,13 @@ class Tracker:
         row = 0
         while row < len(flat):
             if not self._lost and not self._missed:
-                first = row
                 row = follow(
                     self._constants, flat, row, self._legs, self._state, self._limits, self._buffer,
                     self._work, self._position, self._wxyz, rows.arrays(),
                 )  # fmt: skip
                 if row == len(flat):
-                    self._keep_last_but_one(rows, first, row)
+                    self._rates, self._elapsed = None, 1
+                    self._code, self.event = int(rows.status[-1]), Event.FOLLOWED
                     break
             self.update(flat[row])
             self._put(rows, row)
@@ -220,13 +229,6 @@ class Tracker:
         if self.event == Event.FOLLOWED:
             rows.residual[row] = self._buffer[layout.RESIDUAL] * self.platform.size
             rows.iterations[row] = int(self._buffer[layout.COUNT])
-
-    def _keep_last_but_one(self, rows: Rows, first: int, end: int) -> None:
-        """Take over the state of rows that were followed in compiled code."""
-        self._rates, self._elapsed = None, 1
-        self._code, self.event = int(rows.status[end - 1]), Event.FOLLOWED
-        if end - first > 1:
-            self._last_position[0], self._last_wxyz[0] = rows.position[end - 2], rows.wxyz[end - 2]
 
     def __repr__(self) -> str:
         state = f"{self.event.name.lower()}, {self.status.label}"
@@ -302,3 +304,12 @@ class Tracker:
             return False
         translation, rotation = self._candidate.distance(pose)
         return bool(translation <= self._max_shift and rotation <= self._max_turn)
+
+
+def _check_start(start: Pose) -> None:
+    """Raise GoughError unless `start` is one pose of finite numbers."""
+    if not isinstance(start, Pose) or start.batch:
+        found = f"batch {start.batch}" if isinstance(start, Pose) else reprlib.repr(start)
+        raise GoughError(f"start: expected one Pose, found {found}")
+    if not np.all(np.isfinite(start.position)) or not np.all(np.isfinite(start.wxyz)):
+        raise GoughError("start: expected a pose of finite numbers; leave it out if it is unknown")

@@ -26,8 +26,9 @@ CROSSED = OPEN + 2  # a singularity lies between the pose and the last
 BAD_READING = OPEN + 3  # not finite, or not above zero
 
 STEPS = np.int64(12)  # a warm start needs one to three
-# The state: internal pose 7; sign of the determinant; 1 if the mode is the machine's, else 0.
-STATE, SIGN, OURS = 9, 7, 8
+# The state: internal pose 7; sign of the determinant; 1 where the mode is the machine's, else 0; the
+# pose before, as the user sees it: position 3, quaternion 4
+STATE, SIGN, OURS, LAST_POSITION, LAST_WXYZ = 16, 7, 8, 9, 12
 
 
 @jit()
@@ -61,6 +62,10 @@ def cycle(constants, legs, state, limits, buffer, work, position, wxyz):
         return TOO_FAR
     for i in range(7):
         state[0, i] = buffer[i]
+    for i in range(3):
+        state[0, LAST_POSITION + i] = position[0, i]
+    for i in range(4):
+        state[0, LAST_WXYZ + i] = wxyz[0, i]
     state[0, SIGN] = 1.0 if buffer[DETERMINANT] > 0 else -1.0
     if buffer[INSIDE] == 1.0 and constants[HOME_SIGN] != 0.0:
         state[0, OURS] = 1.0

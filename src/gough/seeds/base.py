@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import reprlib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -137,14 +138,21 @@ def _network(platform: Platform, name: str) -> Seed:
     ours = shipped_names(platform)
     if name in ours:
         return _shipped(platform, name)
-    if Path(name).exists() or Path(name).suffix or len(Path(name).parts) > 1:
+    if _may_be_path(name):
         return find_network(platform, name)
     raise GoughError(
-        f"seed: unknown name {name!r}; expected auto, home, universal, taylor-ORDER, "
+        f"seed: unknown name {reprlib.repr(name)}; expected auto, home, universal, taylor-ORDER, "
         "polynomial-DEGREE, the path of a trained network, or one that comes with gough for "
         f"platform {platform.name!r} as it is now "
         f"({', '.join(ours) or 'there is none: see gough train'})"
     )
+
+
+def _may_be_path(name: str) -> bool:
+    try:
+        return Path(name).exists() or bool(Path(name).suffix) or len(Path(name).parts) > 1
+    except OSError:  # longer than names of files may be
+        return False
 
 
 @lru_cache(maxsize=64)
