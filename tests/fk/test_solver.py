@@ -131,10 +131,10 @@ def test_a_polynomial_of_another_machine_guesses_for_that_machine():
 )
 def test_settings_out_of_range_are_refused(name, value, wanted):
     with pytest.raises(gough.GoughError, match=f"^{name}: expected {wanted}$"):
-        gough.Solver("reference", **{name: value})  # pyright: ignore[reportArgumentType]
+        gough.Solver(gough.Platform.load("reference"), **{name: value})  # pyright: ignore[reportArgumentType]
 
 
 def test_a_very_long_name_is_only_unknown():
     with pytest.raises(gough.GoughError, match="seed: unknown name 'nnn") as error:
-        gough.Solver("reference", "n" * 5_000)
+        gough.Solver(gough.Platform.load("reference"), "n" * 5_000)
     assert len(str(error.value)) < 400

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array, as_number, as_whole
+from gough.errors import GoughError
 from gough.fk.solution import Solution
 from gough.kernel.constants import SINGULAR, kernel_constants
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH

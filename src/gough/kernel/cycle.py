@@ -26,8 +26,8 @@ CROSSED = OPEN + 2  # a singularity lies between the pose and the last
 BAD_READING = OPEN + 3  # not finite, or not above zero
 
 STEPS = np.int64(12)  # a warm start needs one to three
-# The state: internal pose 7; sign of the determinant; 1 where the mode is the machine's, else 0; the
-# pose before, as the user sees it: position 3, quaternion 4
+# The state: internal pose 7; sign of the determinant; 1 where the mode is the machine's, else 0;
+# the pose before, as the user sees it: position 3, quaternion 4.
 STATE, SIGN, OURS, LAST_POSITION, LAST_WXYZ = 16, 7, 8, 9, 12
 
 

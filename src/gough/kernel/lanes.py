@@ -39,9 +39,7 @@ class Reals:
     def _emit(self, instruction: str, a: Any, b: Any) -> Any:
         if isinstance(a, Complexes) or isinstance(b, Complexes):
             return NotImplemented  # which knows how to
-        a, b = (
-            x.value if isinstance(x, Reals) else _constant(x) for x in (a, b)
-        )
+        a, b = (x.value if isinstance(x, Reals) else _constant(x) for x in (a, b))
         return Reals(self.builder, getattr(self.builder, instruction)(a, b, flags=_FLAGS))
 
     def __add__(self, other):
