@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from gough import GoughError, cli
-from gough.view import scene
+from gough.view import server
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rubin_camera_legs.csv"
 
@@ -96,7 +96,7 @@ def test_a_port_that_is_taken_is_not_shared():
         other.bind(("127.0.0.1", 0))
         other.listen()
         with pytest.raises(GoughError, match=r"already in use at 127\.0\.0\.1; pass another"):
-            scene.open_server("localhost", other.getsockname()[1], "test")
+            server.open_server("localhost", other.getsockname()[1], "test")
 
 
 def test_it_takes_the_next_port_that_is_free(monkeypatch):
@@ -104,12 +104,12 @@ def test_it_takes_the_next_port_that_is_free(monkeypatch):
         other.bind(("127.0.0.1", 0))
         other.listen()
         first = other.getsockname()[1]
-        monkeypatch.setattr(scene, "FIRST_PORT", first)
-        server = scene.open_server("localhost", None, "test")
+        monkeypatch.setattr(server, "FIRST_PORT", first)
+        found = server.open_server("localhost", None, "test")
         try:
-            assert first < server.get_port() < first + scene.PORTS_TRIED
+            assert first < found.get_port() < first + server.PORTS_TRIED
         finally:
-            scene.close_server(server)
+            server.close_server(found)
 
 
 @pytest.mark.process

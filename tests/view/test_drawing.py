@@ -10,7 +10,8 @@ import gough
 from gough import Platform
 from gough.units import scaled
 from gough.view import meshes
-from gough.view.scene import Scene, close_server, open_server
+from gough.view.scene import Scene
+from gough.view.server import close_server, open_server
 
 CATALOG = Platform.catalog()
 

@@ -112,7 +112,7 @@ def _serve(
 
 def _announce(viewer: Viewer, host: str, port: int | None, browser: bool) -> None:
     """Print the address of the page, and the way to it from another computer."""
-    from gough.view.scene import FIRST_PORT
+    from gough.view.server import FIRST_PORT
 
     if port is None and viewer.port != FIRST_PORT:
         print(f"port {FIRST_PORT} is taken; this is at {viewer.port}")

@@ -15,8 +15,10 @@ from gough.platform import Platform
 from gough.pose import pose_values
 from gough.skeleton import outside_stroke
 from gough.text import decimals, with_unit
-from gough.view import meshes, scene
+from gough.view import meshes
 from gough.view.model import CLOSE, Model, leg_factor, leg_unit
+from gough.view.scene import Scene
+from gough.view.server import close_server, open_server
 
 if TYPE_CHECKING:
     from gough.view.trajectory import Trajectory
@@ -250,9 +252,9 @@ def _curve(x: Array, y: Array, shown: NDArray[np.bool_], color: str) -> str:
 def page(model: Model, trajectory: Trajectory | None = None) -> str:
     """HTML file with the picture of a model, or with a trajectory and a time slider."""
     platform = model.platform
-    server = scene.open_server("localhost", 0, platform.name)
+    server = open_server("localhost", 0, platform.name)
     try:
-        picture = scene.Scene(server, platform, handle=False, panel=False)
+        picture = Scene(server, platform, handle=False, panel=False)
         picture.draw(model.pose, model.legs)
         if trajectory is not None:
             picture.show_path(trajectory.pose)
@@ -263,7 +265,7 @@ def page(model: Model, trajectory: Trajectory | None = None) -> str:
             _record(picture, recording, trajectory, waits)
         html = recording.as_html()
     finally:
-        scene.close_server(server)
+        close_server(server)
     html = html.replace(
         "darkMode:false", "darkMode:matchMedia('(prefers-color-scheme: dark)').matches", 1
     )
@@ -271,7 +273,7 @@ def page(model: Model, trajectory: Trajectory | None = None) -> str:
     return _with_caption(html, platform.name, caption)
 
 
-def _record(picture: scene.Scene, recording, trajectory: Trajectory, waits: Array) -> None:
+def _record(picture: Scene, recording, trajectory: Trajectory, waits: Array) -> None:
     """Draw row after row, with the time between them; rows without a pose keep the last one."""
     for i, answer in enumerate(trajectory.answers):
         if answer.reached:

@@ -15,7 +15,8 @@ from gough.pose import Pose
 from gough.view.export import page
 from gough.view.model import Model
 from gough.view.panel import FIND, Panel
-from gough.view.scene import Scene, close_server, open_server
+from gough.view.scene import Scene
+from gough.view.server import close_server, open_server
 from gough.view.trajectory import Trajectory
 
 if TYPE_CHECKING:
