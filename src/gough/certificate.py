@@ -132,7 +132,9 @@ def certify_struts(platform: Platform, base: Array, lengths: Array, pose: Pose) 
     todo: slice | NDArray[np.int64] = slice(None)
     for turn in TURNS:
         rows = base if len(base) == 1 else base[todo]
-        found = _bounds(platform, turn, rows, lengths[todo], pose[todo])
+        # `pose[todo]` would check and normalise all of them once more
+        part = Pose.trusted(pose.position[todo], pose.wxyz[todo])
+        found = _bounds(platform, turn, rows, lengths[todo], part)
         radius[todo], error[todo] = found
         todo = np.flatnonzero(radius == 0)
         if not len(todo):
