@@ -9,6 +9,8 @@ from .certificate import certify as certify
 from .errors import GoughError as GoughError
 from .errors import InputError as InputError
 from .errors import PlatformError as PlatformError
+from .examination.machine import Check as Check
+from .examination.machine import check as check
 from .fk.solution import Solution as Solution
 from .fk.solve import Solver as Solver
 from .fk.solve import solve as solve

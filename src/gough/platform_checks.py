@@ -142,7 +142,7 @@ def stroke_limits(stroke: ArrayLike | None, legs: LegKind, home_legs: Array) -> 
         found = limits[turns].flat[0]
         raise PlatformError(
             f"stroke: motor angles are in rad, and {found:g} is more than a turn; if it is "
-            f"degrees, write {np.radians(found):.6g}"
+            f"degrees, write {np.radians(found):.6g}, or angle_unit = 'deg' in the file"
         )
     readings = "motor angles" if legs == "rotary" else "leg readings"
     limits = frozen(np.broadcast_to(limits, (6, 2)) + 0.0)

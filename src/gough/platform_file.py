@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gough import quaternion
-from gough.checks import platform_field
+from gough.checks import platform_field, platform_numbers
 from gough.errors import GoughError, PlatformError, suggestion
 from gough.frames import Frames
 from gough.kinematics import home_sign, singularity_distance
@@ -26,7 +26,8 @@ from gough.workspace import Workspace
 log = logging.getLogger("gough")
 REQUIRED = ("base", "moving", "home")
 PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
-OPTIONAL = (*PLAIN, "workspace", "rotary", "frames", "limits", "readings")  # see files.log_format
+ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180}
+OPTIONAL = (*PLAIN, "angle_unit", "workspace", "rotary", "frames", "limits", "readings")
 POSE = ("position", "wxyz", "euler_deg", "order")
 TABLES = {
     "home": POSE,
@@ -90,7 +91,7 @@ def _warned(where: str, platform: Platform) -> Platform:
 def from_toml(text: str, where: str = "platform") -> Platform:
     """Make a platform from TOML text; errors begin with `where`."""
     try:
-        return _from_dict(tomllib.loads(text))
+        return from_dict(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise PlatformError(f"{where}: not valid TOML: {error}") from None
     except GoughError as error:
@@ -120,7 +121,12 @@ def save(platform: Platform, path: str | Path) -> None:
         raise PlatformError(str(error)) from None
 
 
-def _from_dict(facts: dict) -> Platform:
+def from_dict(facts: dict) -> Platform:
+    """Make a platform from the tables of its TOML file.
+
+    Raises:
+        PlatformError: a field that is missing, unknown or wrong.
+    """
     for key in REQUIRED:
         if key not in facts:
             what = "a [home] table" if key == "home" else "six rows [x, y, z]"
@@ -135,7 +141,7 @@ def _from_dict(facts: dict) -> Platform:
                     f"{name}: expected a table with {', '.join(keys)}; found {facts[name]!r}"
                 )
             known_keys(f"{name}.", facts[name], keys)
-    options = {k: facts[k] for k in PLAIN if k in facts}
+    options = {k: facts[k] for k in PLAIN if k in facts} | _in_radians(facts)
     return Platform(
         facts["base"],
         facts["moving"],
@@ -146,6 +152,17 @@ def _from_dict(facts: dict) -> Platform:
         limits=MachineLimits(**facts["limits"]) if "limits" in facts else None,
         **options,
     )
+
+
+def _in_radians(facts: dict) -> dict:
+    """Stroke and offset of motors in radians, where `angle_unit` states their unit."""
+    unit = facts.get("angle_unit", "rad")
+    if not isinstance(unit, str) or unit not in ANGLE_UNITS:
+        raise PlatformError(f"angle_unit: expected 'deg' or 'rad', found {unit!r}")
+    if "angle_unit" in facts and facts.get("legs") != "rotary":
+        raise PlatformError("angle_unit: is for the stroke and offset of rotary legs only")
+    given = [key for key in ("stroke", "offset") if key in facts and unit != "rad"]
+    return {key: ANGLE_UNITS[unit] * platform_numbers(key, facts[key]) for key in given}
 
 
 def _table(kind, name: str, facts: dict):

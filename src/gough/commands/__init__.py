@@ -11,6 +11,7 @@ from __future__ import annotations
 COMMANDS = {
     "solve": ("gough.commands.solve", "run", "Poses from a file of leg readings."),
     "inverse": ("gough.commands.inverse", "run", "Leg readings from a file of poses."),
+    "check": ("gough.commands.check", "run", "A machine's file and log examined for mistakes."),
     "modes": ("gough.commands.modes", "run", "Every pose that has given leg readings, proven."),
     "plan-poses": ("gough.commands.plan_poses", "run", "The poses to measure for a calibration."),
     "calibrate": ("gough.commands.calibrate", "run", "The machine as it is, from measured poses."),

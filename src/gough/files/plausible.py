@@ -8,6 +8,7 @@ from gough.checks import Array
 from gough.errors import InputError
 from gough.files.log_format import LogFormat
 from gough.files.rows import Source
+from gough.limit_rules import in_stroke
 from gough.platform import Platform
 from gough.units import LENGTHS
 
@@ -65,7 +66,7 @@ def cause(platform: Platform, legs: Array) -> str:
     if np.any(far):
         legs_far = np.flatnonzero(far)
         named = ", ".join(f"leg_{leg + 1} is {legs[leg]:.6g}" for leg in legs_far)
-        return f"{named}, the others are as near home: no signal, or a digit too many or too few?"
+        return f"{named}, the others are like home's: no signal, or a digit too many or too few?"
     return ""
 
 
@@ -117,21 +118,28 @@ def _length_fault(platform: Platform, rows: Array) -> str:
             "readings are on both sides of zero, and this machine's are lengths: if they count "
             f"from home, pass --offset={offset}; {right}"
         )
+    by_unit = _unit_fault(platform, rows, ratio)
     below = [_below_stroke(platform, row) for row in rows[:: 1 + len(rows) // 100]]
-    if np.mean(below) > 0.9 and platform.stroke is not None:
+    if np.mean(below) > 0.9 and platform.stroke is not None and not by_unit[1]:
         offset = ",".join(f"{value:.9g}" for value in platform.stroke[:, 0])
         return (
             "readings are below the stroke, by its lower end: if they count from the retracted "
             f"end, pass --offset={offset}; {right}"
         )
+    return by_unit[0] and f"{by_unit[0]}; {right}"
+
+
+def _unit_fault(platform: Platform, rows: Array, ratio: float) -> tuple[str, bool]:
+    """Advice on rows in another unit, and whether it brings them within a stated stroke."""
     for unit in UNITS if platform.unit in LENGTHS else ():
         factor = LENGTHS[platform.unit] / LENGTHS[unit]
         if unit != platform.unit and _agree(np.asarray(ratio), np.asarray(factor)):
-            return (
+            text = (
                 f"readings are about {ratio:.3g} times those at home [{platform.unit}]: if they "
-                f"are in [{unit}], pass --unit {unit}; {right}"
+                f"are in [{unit}], pass --unit {unit}"
             )
-    return ""
+            return text, bool(np.mean(in_stroke(platform, rows / factor)) > 0.9)
+    return "", False
 
 
 def _agree(values: Array, expected: Array) -> bool:
