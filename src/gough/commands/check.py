@@ -148,7 +148,7 @@ def _print_reach(found: Check, screen: Any) -> None:
     for axis, (low, high), (first, second) in found.reach_rows():
         unit = " deg" if axis.startswith("r") else _plain(found.platform.unit)
         table.add_row(
-            axis, f"-{low:.4g}{unit}", first or "nothing", f"+{high:.4g}{unit}", second or "nothing"
+            axis, f"-{low:.5g}{unit}", first or "nothing", f"+{high:.5g}{unit}", second or "nothing"
         )
     screen.print("Reach from home, one axis at a time (the workspace aside):", markup=False)
     screen.print(table)
@@ -183,8 +183,8 @@ def _print_steps(found: Check, screen: Any) -> None:
     step = f"{np.degrees(steps.step):.4g} deg" if rotary else f"{steps.step:.4g}"
     unit = f" [{found.platform.unit}]" if found.platform.unit else ""
     screen.print(
-        f"One leg at a time, its reading raised by {step}: rise of the platform's joints{unit}\n"
-        "along the base's z, and rotation about z:",
+        f"One leg at a time, its reading raised by {step}: rise of the platform's\n"
+        f"joints P1 to P6 along the base's z{unit}, and rotation about z:",
         markup=False,
     )
     table = plain_table("leg", *(f">P{k + 1}" for k in range(6)), ">rz_deg")
@@ -217,8 +217,8 @@ def _print_log(found: LogCheck, platform: Any, screen: Any) -> None:
     screen.print(table)
     factor, offset = found.conversion.T
     if np.any(factor != 1) or np.any(offset != 0):
-        changes = _same(factor), _same(offset)
-        screen.print(f"reading = {changes[0]} x value + {changes[1]}", markup=False)
+        added = f" + {_same(offset)}" if np.any(offset != 0) else ""
+        screen.print(f"reading = {_same(factor)} x value{added}", markup=False)
     counts = plain_table("status", ">rows", ">share")
     for outcome, count in zip(report.outcomes, report.counts, strict=True):
         if count:

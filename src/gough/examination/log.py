@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gough.checks import Array
 from gough.columns import LEGS, file_leg_columns
@@ -185,5 +185,5 @@ def order_guess(platform: Platform, legs: Array) -> str:
     )
 
 
-def _order_text(order: Sequence[int]) -> str:
-    return " ".join(str(leg + 1) for leg in order)
+def _order_text(order: NDArray[np.intp]) -> str:
+    return " ".join(str(leg + 1) for leg in order.tolist())

@@ -230,9 +230,9 @@ def cures(text: str) -> list[str]:
 
 
 def _changes(platform: Platform, limits: Array) -> Iterator[Change]:
-    def joints(plane: float = 1.0, order: Array | None = None, mirror: float = 1.0):
+    def joints(plane: float = 1.0, order: NDArray[np.intp] | None = None, mirror: float = 1.0):
         scale = np.array([plane, plane, 1.0])
-        moving = platform.moving[np.arange(6) if order is None else order]
+        moving = platform.moving if order is None else platform.moving[order]
         moving = moving * scale * np.array([1.0, mirror, 1.0])
         return lambda: replace(platform, base=platform.base * scale, moving=moving)
 
