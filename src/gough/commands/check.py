@@ -191,7 +191,7 @@ def _print_steps(found: Check, screen: Any) -> None:
     places = max(0, 1 - int(np.floor(np.log10(np.abs(steps.rise).max()))))
     for leg in range(6):
         rises = (f"{v:z.{places}f}" for v in steps.rise[leg])
-        table.add_row(str(leg + 1), *rises, f"{np.degrees(steps.turn[leg]):+.2f}")
+        table.add_row(str(leg + 1), *rises, f"{np.degrees(steps.turn[leg]):+z.2f}")
     screen.print(table)
 
 

@@ -161,8 +161,8 @@ def _fitting_rows(report: Report, places: int) -> list[list[str]]:
 
     def written(drop: int) -> list[list[str]]:
         return [
-            [f"{v:.{places - drop}f}" for v in position]
-            + [f"{v:.{max(5 - drop, 2)}f}" for v in turn]
+            [f"{v:z.{places - drop}f}" for v in position]
+            + [f"{v:z.{max(5 - drop, 2)}f}" for v in turn]
             + [label]
             for position, turn, label in zip(report.pose.position, angles, labels, strict=True)
         ]
