@@ -121,8 +121,8 @@ def check(platform: Platform) -> Check:
 
     Example:
         >>> found = gough.check(gough.Platform.load("reference"))
-        >>> found.ok, found.fitting, round(found.nearest, 2)
-        (True, 1, 0.25)
+        >>> found.ok, found.poses, found.fitting, round(found.nearest, 3)
+        (True, 16, 1, 0.007)
     """
     box = platform.workspace or sure_workspace(platform) or Workspace.about_home(0.0, 0.0)
     poses = box.sample(platform.home, SAMPLES, seed=0)
