@@ -12,6 +12,7 @@ from contextlib import nullcontext, suppress
 from importlib import import_module
 
 import gough
+from gough import compiling
 from gough.commands import COMMANDS, help_text, signals
 from gough.errors import GoughError, printable, suggestion
 
@@ -34,7 +35,8 @@ def main(arguments: list[str] | None = None) -> None:
     notes.setFormatter(_Printable())
     logging.getLogger("gough").addHandler(notes)
     signals.listen()
-    code = _run(given)
+    with compiling.announced(_print_compiling) if sys.stderr.isatty() else nullcontext():
+        code = _run(given)
     signals.ignore()
     try:
         sys.stdout.flush()
@@ -42,6 +44,10 @@ def main(arguments: list[str] | None = None) -> None:
         _drop_output()
     logging.getLogger("gough").removeHandler(notes)
     sys.exit(code)
+
+
+def _print_compiling(name: str) -> None:
+    print(f"compiling {name} for this processor, once ...", file=sys.stderr, flush=True)
 
 
 def _run(arguments: list[str]) -> int:

@@ -225,3 +225,44 @@ def test_control_characters_of_files_do_not_reach_the_terminal(gough, tmp_path):
     code, _, err = gough("solve", log, "-p", "reference")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "\x1b" not in err
+
+
+def test_warmup_compiles_everything_and_names_the_folder(gough, monkeypatch):
+    """With one job in place of all; the real ones run all compiled functions."""
+    import gough.kernel.jit as jit
+    from gough import compiling
+    from gough.commands import warmup
+
+    assert {"few rows", "many rows", "tracker", "assembly modes"} <= set(warmup._jobs())
+
+    @jit.jit(cache=False)
+    def twice(x):
+        return 2.0 * x
+
+    monkeypatch.setattr(warmup, "_jobs", lambda: {"doubling": lambda machine: twice(machine.size)})
+    monkeypatch.setattr(jit, "_lost", [])
+    heard = []
+    with compiling.announced(heard.append):
+        assert "doubling: compiled in" in gough("warmup").out
+    assert heard == ["twice"]
+    again = gough("warmup").out
+    assert "doubling: there already" in again
+    assert "kept in /" in again
+    monkeypatch.setattr(jit, "_lost", ["twice"])
+    code, _, err = gough("warmup")
+    assert code == 2
+    assert "cannot be kept (twice)" in err
+    assert "set NUMBA_CACHE_DIR to a folder" in err
+
+
+def test_compiling_is_not_counted_as_solving(monkeypatch):
+    from gough import compiling
+    from gough.files import report as module
+
+    now, spent = [50.0], [7.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(compiling, "seconds", lambda: spent[0])
+    report = module.Report(tuple(library.Status))
+    now[0], spent[0] = 153.0, 107.0  # 103 s later, 100 of them spent on compiling
+    report.add(library.Pose(np.zeros((1, 3))), np.ones((1, 6)), np.zeros(1, np.uint8), np.zeros(1))
+    assert (report.seconds, report.compiling) == (3.0, 100.0)

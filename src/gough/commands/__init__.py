@@ -20,6 +20,7 @@ COMMANDS = {
     "platforms": (
         "gough.commands.platforms", "run", "The machines that come with gough, to copy and edit.",
     ),
+    "warmup": ("gough.commands.warmup", "run", "Compile beforehand what first answers wait for."),
     "export": ("gough.commands.export", "FORMATS", "A machine for other programs, such as C."),
     "dataset": ("gough.commands.dataset", "run", "Poses and leg readings to train networks on."),
     "train": ("gough.commands.train", "run", "Train a network that guesses a machine's poses."),

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gough.platform import Platform
 
 WIDTH = 80  # columns that tables of poses fit in
-NOTICEABLE = 2.0  # [s] of compiling that are reported
+NOTICEABLE = 0.5  # [s] of compiling that are reported
 STANDARD = "-"  # as in gough.files, whose import takes too long for a help text
 # one rule, below the head
 RULE = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
@@ -81,8 +81,8 @@ def print_summary(report: Report, platform: Platform, out: str | None, screen: C
         f"{report.rows:,} rows in {report.seconds:.3g} s ({rate:,.0f} rows/s){target}",
         markup=False,
     )
-    if report.preparing > NOTICEABLE:
-        screen.print(f"(before that {report.preparing:.0f} s to compile the solver, once)")
+    if report.compiling > NOTICEABLE:
+        screen.print(f"(besides {report.compiling:.1f} s to compile the solver, once)")
     residuals = not np.all(np.isnan(report.worst))
     heads = ["status", ">rows", ">share"] + ["worst residual"] * residuals
     table = plain_table(*heads)
@@ -221,7 +221,7 @@ def progress_bar() -> Iterator[Tick]:
 
     columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"))
     with Progress(*columns, TimeRemainingColumn(), console=console(errors=True)) as bar:
-        task = bar.add_task("", total=None, rate="starting (a first run compiles)")
+        task = bar.add_task("", total=None, rate="starting")
 
         def update(source: Source, report: Report) -> None:
             rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"

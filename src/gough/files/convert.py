@@ -108,7 +108,6 @@ def solve_file(
             readings = block.numbers(LEGS)
             if report.rows == 0:
                 check_plausible(job.source, platform, readings)
-                solver.compile(1 if tracker else len(block), certify=certify)
                 report.start()
             if tracker:
                 solution = tracker.follow(readings, leg_noise=leg_noise)

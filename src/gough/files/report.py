@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gough import compiling
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.files.rows import Block
@@ -35,7 +36,7 @@ class Report:
         pose, legs, status, event: the first rows, at most `head`; no events where there are none.
         seconds: time taken by the rows.
         frame: whose poses those are, such as "tool in work"; "" for the platform's.
-        preparing: time before them, to compile the solver and to fit its seed.
+        compiling: time taken by compiling the solver, which is not in `seconds`.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -53,19 +54,19 @@ class Report:
     status: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     event: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     seconds: float = 0.0
-    preparing: float = 0.0
+    compiling: float = 0.0
 
     def __post_init__(self) -> None:
         if self.head < 0:
             raise GoughError(f"head: expected 0 or more rows, found {self.head}")
         self.counts = np.zeros(len(self.outcomes), np.int64)
         self.worst = np.full(len(self.outcomes), np.nan)
-        self._start = time.perf_counter()
+        self._compiled_before = compiling.seconds()
+        self.start()
 
     def start(self) -> None:
-        """Begin to count the rows' time; the time before is `preparing`."""
-        self.preparing = time.perf_counter() - self._start
-        self._start = time.perf_counter()
+        """Begin to count the rows' time."""
+        self._start = time.perf_counter() - compiling.seconds()
 
     @property
     def rows(self) -> int:
@@ -108,7 +109,8 @@ class Report:
         if event is not None:
             self.event = np.concatenate([self.event, event[part]])
         self.status = np.concatenate([self.status, status[part]])
-        self.seconds = time.perf_counter() - self._start
+        self.compiling = compiling.seconds() - self._compiled_before
+        self.seconds = time.perf_counter() - compiling.seconds() - self._start
 
     def describe_invalid(
         self, block: Block, rows: NDArray[np.bool_], fault: Callable[[int], str]

@@ -1,4 +1,7 @@
-"""Numba's decorator, set up once: safe fast-math, no GIL, and a cache that notices changes."""
+"""Numba's decorator, set up once: safe fast-math, no GIL, and a cache that notices changes.
+
+Compiling is reported to `gough.compiling`.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core import event
 
-from gough import home_mode, status
+from gough import compiling, home_mode, status
 
 Function = TypeVar("Function", bound=Callable)
 
@@ -19,6 +23,8 @@ Function = TypeVar("Function", bound=Callable)
 # is not, since invalid readings must stay visible. Mind that Numba's isfinite(x) is
 # x - x == 0, which these flags fold to True: compare abs(x) < inf instead.
 FAST = {"contract", "reassoc", "arcp", "nsz"}
+_kept: list[Any] = []  # functions whose compiled code is kept on disk
+_lost: list[str] = []  # names of those whose code no folder takes
 
 
 def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Function], Function]:
@@ -39,8 +45,10 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
         except RuntimeError as error:
             if "no locator" not in str(error):
                 raise
+            _lost.append(function.__name__)
             return numba.njit(**settings, **options)(function)  # pyright: ignore
         if cache:
+            _kept.append(compiled)
             _expire_with_sources(compiled, Path(inspect.getfile(function)).parent)
         return compiled  # pyright: ignore[reportReturnType]
 
@@ -67,6 +75,24 @@ def inner(function: Callable | None = None, *, fast: bool = True, inline: bool =
 def inline(function: Callable) -> Any:
     """Compile a function into its compiled callers, for use as `@inline`; see `inner`."""
     return inner(function, inline=True)
+
+
+def cache_folders() -> tuple[list[str], list[str]]:
+    """Return the folders in which compiled code is kept, and functions whose code cannot be."""
+    return sorted({function.stats.cache_path for function in _kept}), _lost
+
+
+class _Compiling(event.Listener):
+    """Passes on when compiling begins and ends."""
+
+    def on_start(self, event: Any) -> None:
+        compiling.clock.begin(event.data["dispatcher"].py_func.__name__)
+
+    def on_end(self, event: Any) -> None:
+        compiling.clock.end()
+
+
+event.register("numba:compile", _Compiling())
 
 
 def _expire_with_sources(compiled, folder: Path) -> None:
