@@ -14,7 +14,7 @@ from gough.errors import GoughError
 from gough.fk.solution import Solution
 from gough.kernel.constants import SINGULAR, kernel_constants
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
-from gough.kernel.rows import STEPS, solve_rows
+from gough.kernel.rows import STEPS, settle_rows, solve_rows
 from gough.kernel.threads import in_parts
 from gough.kinematics import home_sign, pose_covariance
 from gough.platform import Platform, as_platform
@@ -26,7 +26,8 @@ from gough.tables import Table, TableInfo, as_readings, table_info
 if TYPE_CHECKING:
     from gough.fk.tracker import Tracker
 
-FEW = 1_024  # rows that the row solver takes without the block solver, which compiles longer
+FEW = 1_024  # rows that are taken one by one: the code for blocks compiles longer
+PART = 64  # open rows that a thread takes at a time
 NO_POSES = np.empty((0, 7))
 MOST_STEPS, MOST_STARTS, MOST_WORKERS = 10_000, 10_000, 10_000
 
@@ -179,9 +180,9 @@ class Solver:
     ) -> Solution:
         """Solve every row of readings.
 
-        Large batches go through plain Newton in blocks; rows that do not settle there, or settle
-        outside the workspace, and all rows of small batches are solved one by one, with a damped
-        method and from further starts where Newton fails.
+        Large batches go through plain Newton in blocks, small ones row by row; rows that do not
+        settle there, or settle outside the workspace, are then solved with a damped method, and
+        from further starts where that fails, too.
 
         Args:
             legs: readings (..., 6): lengths, length changes [platform unit] or motor angles
@@ -210,10 +211,11 @@ class Solver:
         rows = Rows.empty(len(flat))
         start = starting_poses(self.platform, self.seed, flat)
         if len(flat) <= FEW:
-            invalid = self._solve_rows(flat, np.arange(len(flat)), start, rows, part=256)
+            troubled = self._settle_rows(flat, start, rows)
         else:
-            invalid = self._solve_blocks(flat, start, rows)
-        if invalid:
+            troubled = self._solve_blocks(flat, start, rows)
+        if troubled:
+            self._solve_rows(flat, np.flatnonzero(rows.status == OPEN), start, rows)
             rows.fill_invalid_with_nan()
         if ambiguous or self._is_unsure:
             self._consult_modes(flat, rows)
@@ -223,12 +225,16 @@ class Solver:
         return found if self.frame is None else found.in_frame(self.platform, self.frame)
 
     def compile(self, count: int = 1, *, certify: bool = False) -> None:
-        """Compile, or load from disk, all that a batch of `count` rows needs.
+        """Compile, or load from disk, all that a batch of `count` rows may need.
 
-        The first call does so by itself; this separates the time it takes from that of solving.
+        The first call compiles what its rows need, and the first row that Newton's method does
+        not settle the rest; a program that cannot wait for it then calls this before.
         """
         legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
-        replace(self, seed="home")(legs, certify=certify)
+        solver = replace(self, seed="home")
+        solver(legs, certify=certify)
+        start = starting_poses(self.platform, solver.seed, legs)
+        solver._solve_rows(legs, np.arange(1), start, Rows.empty(len(legs)))
 
     @property
     def _is_unsure(self) -> bool:
@@ -259,10 +265,7 @@ class Solver:
         rows.status[usable[unknown]] = Status.AMBIGUOUS
 
     def _solve_blocks(self, legs: Array, start: Start, rows: Rows) -> int:
-        """Take plain Newton steps on all rows, then solve those that it leaves open.
-
-        Returns 0 where no row is invalid.
-        """
+        """Take plain Newton steps on all rows; return how many are open or invalid."""
         from gough.kernel.block import solve_blocks
 
         constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
@@ -277,19 +280,23 @@ class Solver:
                 (*scratch, polynomial.scratch()), out,
             )  # fmt: skip
 
-        troubled = in_parts(work, len(legs), self.workers)
-        if troubled:
-            chosen = np.flatnonzero(rows.status == OPEN)
-            self._solve_rows(legs, chosen, start, rows, part=64)
-        return troubled
+        return in_parts(work, len(legs), self.workers)
 
-    def _solve_rows(
-        self, legs: Array, chosen: NDArray[np.intp], start: Start, rows: Rows, part: int
-    ) -> int:
-        """Solve chosen rows (K,) one by one, `part` of them at a time on each thread.
+    def _settle_rows(self, legs: Array, start: Start, rows: Rows) -> int:
+        """Take plain Newton steps on a few rows; return how many are open or invalid."""
+        constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
+        steps = min(self.max_iterations, int(STEPS))
 
-        Returns how many are invalid.
-        """
+        def work(first: int, last: int) -> int:
+            guess, buffer = start.of(slice(first, last)), np.zeros(COMPONENTS)
+            return settle_rows(
+                constants, legs, guess, self.tolerance, steps, first, last, buffer, out
+            )
+
+        return in_parts(work, len(legs), self.workers, chunk=256, serial=256)
+
+    def _solve_rows(self, legs: Array, chosen: NDArray[np.intp], start: Start, rows: Rows) -> None:
+        """Solve chosen rows (K,) one by one, from further starts where need be."""
         constants, out = kernel_constants(self.platform, self.singular), rows.arrays()
         starts = further_starts(self.platform, self.restarts if self.max_iterations else 0)
         # a given pose says which assembly mode is meant
@@ -301,7 +308,7 @@ class Solver:
             scratch = np.zeros(COMPONENTS), np.zeros(COMPONENTS), np.zeros((4, 6, 6))
             return solve_rows(constants, legs, some, start.of(some), starts, settings, scratch, out)
 
-        return in_parts(work, len(chosen), self.workers, chunk=part, serial=part)
+        in_parts(work, len(chosen), self.workers, chunk=PART, serial=PART)
 
     def _certify(self, legs: Array, rows: Rows) -> Array:
         """Radii of uniqueness (N,) [platform unit], 0 where unproven; promote converged rows."""

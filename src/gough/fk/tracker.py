@@ -116,8 +116,8 @@ class Tracker:
         self.pose = Pose.trusted(self._position[0], self._wxyz[0])
         self._code, self.event = int(Status.CONVERGED), Event.FOUND
         self._set_pose(platform.home)
-        self._run_cycle()  # these two compile what a cycle may need, if it is not yet on disk
-        self._solver(platform.home_legs)
+        self._run_cycle()  # these compile what a cycle may need, if it is not yet on disk
+        self._solver.compile()
         self._lost = start is None
         self._set_pose(platform.home if start is None else start)
 

@@ -1,6 +1,7 @@
-"""The row solver: one row after another, from several starts where need be.
+"""The row solvers: one row after another, by plain Newton or from several starts.
 
-It solves all rows of small batches, and of large ones those that the block solver left open.
+`settle_rows` takes small batches. `solve_rows` takes the rows that it, or the block solver of large
+batches, leaves open; it takes twice as long to compile, and is compiled when a row needs it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from gough.kernel.layout import (
     INSIDE,
     JOINTS,
     LENGTH,
+    OPEN,
     RADIUS,
     REGULAR,
     RESIDUAL,
@@ -49,6 +51,38 @@ ENOUGH_STARTS, FEW_STARTS = 8, 2
 NO_POSE, OTHER, OURS, WITHIN = 0, 1, 2, 3  # OURS: home's mode; WITHIN: in the workspace, too
 FARTHEST = 5.0  # length of a leg, as a share of the size, that none could have
 PATIENCE = 6  # times the limit, for the last look at a row that no start settled
+
+
+@jit()
+def settle_rows(constants, legs, guess, tolerance, steps, first, last, buffer, out):
+    """Solve rows first..last of legs (N, 6) by plain Newton, as `solve_blocks` does many.
+
+    Args:
+        guess: (last - first, 7) internal poses to start from.
+        tolerance: largest strut error, as a share of the platform's size.
+        steps: limit of Newton steps.
+        buffer: (COMPONENTS,) to work in.
+        out: as for `solve_rows`; the status is OPEN where the row needs that.
+
+    Returns:
+        How many of the rows are open or invalid.
+    """
+    position, wxyz, residuals, iterations, statuses = out
+    troubled = 0
+    for row in range(first, last):
+        valid = put_reading(constants, legs, row, buffer, FIRST, SINGLE)
+        put_pose(buffer, FIRST, SINGLE, guess, row - first)
+        status = OPEN if valid else INVALID_INPUT
+        if valid and newton(constants, buffer, tolerance, steps):
+            put_user_position(constants, buffer, FIRST, SINGLE)
+            get_pose(buffer, FIRST, SINGLE, position, wxyz, row)
+            residuals[row] = buffer[RESIDUAL] * constants[SIZE]
+            iterations[row] = int(buffer[COUNT])
+            if buffer[INSIDE] == 1.0 and buffer[REGULAR] == 1.0:
+                status = CONVERGED if in_stroke(constants, legs, row) else OUTSIDE_STROKE
+        statuses[row] = status
+        troubled += 1 if status >= INVALID_INPUT else 0
+    return troubled
 
 
 @jit()
