@@ -282,8 +282,10 @@ class PlayerPanel:
     ) -> None:
         self._trajectory = trajectory
         gui.add_markdown(trajectory.about)
-        last = max(len(trajectory) - 1, 1)
-        self.slider = gui.add_slider("row", 0, last, 1, 0, disabled=len(trajectory) < 2, marks=())
+        first, last, step = trajectory.numbers
+        self.slider = gui.add_slider(
+            "row", first, max(last, first + 1), step, first, disabled=last == first, marks=()
+        )
         self._play = _button(gui, "Play", lambda: post("play", {}), icon=viser.Icon.PLAYER_PLAY)
         speed = gui.add_dropdown("speed", SPEEDS, initial_value="1x", hint=trajectory.pace)
         self._where = gui.add_html("")
@@ -293,7 +295,7 @@ class PlayerPanel:
         @self.slider.on_update
         async def _(event: viser.GuiEvent) -> None:
             if event.client_id is not None:
-                post("row", {"row": int(self.slider.value)})
+                post("row", {"row": (int(self.slider.value) - first) // step})
 
         @speed.on_update
         async def _(_: viser.GuiEvent) -> None:
@@ -301,7 +303,7 @@ class PlayerPanel:
 
     def show(self, row: int, playing: bool) -> None:
         """Bring slider, button and text to a row."""
-        self.slider.value = row
+        self.slider.value = int(self._trajectory.number[row])
         self._play.label = "Pause" if playing else "Play"
         self._where.content = row_text(self._trajectory, row)
 

@@ -49,6 +49,12 @@ class Trajectory:
         return len(self.number)
 
     @property
+    def numbers(self) -> tuple[int, int, int]:
+        """Numbers of the first and the last row in the file, and the step from row to row."""
+        first, last = int(self.number[0]), int(self.number[-1])
+        return first, last, int(self.number[1]) - first if len(self) > 1 else 1
+
+    @property
     def failures(self) -> int:
         """Number of rows without a pose."""
         return sum(not answer.reached for answer in self.answers)
@@ -58,7 +64,7 @@ class Trajectory:
         """Sentence that names the file and the rows shown."""
         rows = f"{self.total:,} rows of {self.of}"
         if len(self) < self.total:
-            step = int(self.number[1] - self.number[0])
+            step = self.numbers[2]
             rows += f", of which every {step:,}th is shown"
         failed = f"; {self.failures:,} of the shown rows have no pose" if self.failures else ""
         return f"{self.name}: {rows}{failed}."
