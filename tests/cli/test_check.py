@@ -155,6 +155,18 @@ def test_a_mistake_in_a_log_is_guessed(tmp_path, change, text) -> None:
     assert text in " ".join(remark.text for remark in found.remarks)
 
 
+def test_columns_of_unknown_names_are_listed_and_can_be_given(gough, tmp_path) -> None:
+    """Below a preamble: the names are those above the first numbers."""
+    mine, log = tmp_path / "mine.toml", tmp_path / "log.csv"
+    table().save(mine)
+    rows = "\n".join(";".join(f"{v:.4f}" for v in row) for row in readings(table())[:9])
+    log.write_text("Logger 7;rev 2\n" + ";".join(f"Foo {k}" for k in "abcdef") + "\n" + rows)
+    done = gough("check", mine, log)
+    assert done.code == 2
+    assert "found Foo a, Foo b" in done.err.replace("\n", " ")
+    assert gough("check", mine, log, "--columns", "1:6").code == 0
+
+
 def test_degrees_of_motors_are_noticed_and_stated_in_the_file(gough, tmp_path) -> None:
     reachy = Platform.load("reachy_mini")
     legs = leg_lengths(reachy, reachy.sample_poses(40, seed=1))

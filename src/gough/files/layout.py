@@ -158,6 +158,9 @@ def _named(
             for names in _headers(text, delimiter):
                 if log.find(names) or all(name in names for name in POSITION):
                     return index, delimiter, names
+    found = _above_numbers(lines[first : first + SEARCHED], delimiters)
+    if found:
+        return first + found[0], found[1], found[2]
     index = next((i for i in range(first, len(lines)) if lines[i].strip()), first)
     try:
         text = lines[index].decode("utf-8").rstrip("\r\n")
@@ -183,6 +186,20 @@ def _named(
     except csv.Error as error:
         raise InputError(f"{where}: line {index + 1}: {error}; expected column names") from None
     return index, delimiter, names
+
+
+def _above_numbers(
+    lines: list[bytes], delimiters: Sequence[str]
+) -> tuple[int, str, list[str]] | None:
+    """Index, delimiter and fields of a line of words above a row of six numbers or more."""
+    for index in range(len(lines) - 1):
+        for delimiter in _in_order(delimiters):
+            above, below = (_fields(line, delimiter) for line in lines[index : index + 2])
+            words = not any(map(NUMBER.fullmatch, above))
+            numbers = sum(NUMBER.fullmatch(field) is not None for field in below)
+            if words and len(above) == len(below) and numbers >= 6:
+                return index, delimiter, above
+    return None
 
 
 def _numbered(

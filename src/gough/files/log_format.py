@@ -24,7 +24,8 @@ from gough.units import ANGLES, LENGTHS
 # words that name a leg or its sensor where a number follows
 WORDS = (
     "a", "act", "actuator", "arm", "axis", "cyl", "cylinder", "enc", "encoder", "jack", "joint",
-    "l", "leg", "legs", "length", "len", "limb", "m", "motor", "q", "servo", "strut",
+    "l", "leg", "legs", "length", "len", "limb", "m", "motor", "pod", "q", "ram", "servo", "strut",
+    "zyl", "zylinder",
 )  # fmt: skip
 # words after the number; others, such as "velocity", mean another quantity
 QUANTITIES = (
