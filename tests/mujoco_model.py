@@ -87,6 +87,33 @@ def joint_angles(
                  for side in zip(*seen, strict=True))  # fmt: skip
 
 
+def spring_forces(platform: Platform, pose: Pose, away: Pose, springs: Floats) -> Floats:
+    """Wrench (6,) that six springs in place of the legs, at rest at `pose`, exert at `away`.
+
+    Force and moment about the pivot, in world axes.
+    """
+    model = mujoco.MjModel.from_xml_string(_mjcf(platform))
+    data = mujoco.MjData(model)
+    for place in (pose, away):
+        data.qpos[:] = [*(place.position + platform.pivot_point), *place.wxyz]
+        mujoco.mj_forward(model, data)
+        if place is pose:
+            model.tendon_stiffness[:] = springs
+            model.tendon_lengthspring[:] = data.ten_length[:, None]
+    force = data.qfrc_passive.copy()
+    return np.concatenate([force[:3], away.rotation @ force[3:]])
+
+
+def leg_velocities(platform: Platform, pose: Pose, twist: Floats) -> Floats:
+    """Velocities (6,) of tendons in place of the legs, as MuJoCo has them."""
+    model = mujoco.MjModel.from_xml_string(_mjcf(platform))
+    data = mujoco.MjData(model)
+    data.qpos[:] = [*(pose.position + platform.pivot_point), *pose.wxyz]
+    data.qvel[:] = [*twist[:3], *(pose.rotation.T @ twist[3:])]
+    mujoco.mj_forward(model, data)
+    return data.ten_velocity.copy()
+
+
 def _seen(model: mujoco.MjModel, data: mujoco.MjData, start: str, end: str, i: int) -> Floats:
     """Unit vector from one site of leg i to the other, in the frame of the first one's body."""
     site = model.site(f"{start}{i}").id

@@ -43,6 +43,13 @@ from .seeds.base import PoseSeed as PoseSeed
 from .seeds.base import Seed as Seed
 from .seeds.network import NetworkSeed as NetworkSeed
 from .seeds.polynomial import PolynomialSeed as PolynomialSeed
+from .statics import ForceRange as ForceRange
+from .statics import axis_speeds as axis_speeds
+from .statics import dexterity as dexterity
+from .statics import force_range as force_range
+from .statics import softest_stiffness as softest_stiffness
+from .statics import stiffness as stiffness
+from .statics import top_speeds as top_speeds
 from .status import Event as Event
 from .status import ModesStatus as ModesStatus
 from .status import Status as Status

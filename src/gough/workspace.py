@@ -94,8 +94,16 @@ class Workspace:
     def draw(self, home: Pose, count: int, rng: np.random.Generator) -> Pose:
         """Draw the next poses of a random generator, batch (count,)."""
         translation = rng.uniform(*self.translation.T, size=(count, 3))
-        angles = np.radians(rng.uniform(*self.rotation_deg.T, size=(count, 3)))
-        rotation = quaternion.from_euler(angles)
+        return self._placed(home, translation, rng.uniform(*self.rotation_deg.T, size=(count, 3)))
+
+    def at(self, home: Pose, shares: Array) -> Pose:
+        """Return poses (...) at shares (..., 6) of the box: 0 its lowest, 1 its highest values."""
+        low, high = np.concatenate([self.translation, self.rotation_deg]).T
+        values = low + shares * (high - low)
+        return self._placed(home, values[..., :3], values[..., 3:])
+
+    def _placed(self, home: Pose, translation: Array, angles_deg: Array) -> Pose:
+        rotation = quaternion.from_euler(np.radians(angles_deg))
         return Pose(home.position + translation, quaternion.product(home.wxyz, rotation))
 
     def contains(self, home: Pose, pose: Pose, length: float, angle: float) -> NDArray[np.bool_]:
