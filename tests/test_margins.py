@@ -328,3 +328,19 @@ def test_legs_that_share_a_joint_are_not_compared() -> None:
     genhex = Platform.load("linuxcnc_genhex")
     found = gough.limits(replace(genhex, limits=MachineLimits(leg_radius=0.05)), genhex.home)
     assert found.of("clearance") > 0
+
+
+@pytest.mark.parametrize("batch", support.BATCHES)
+def test_solutions_carry_their_limits(batch: tuple[int, ...]) -> None:
+    platform = machines.limited(Platform.load("rubin_camera"))
+    pose = support.sample(platform, batch)
+    found = gough.solve(platform, gough.leg_lengths(platform, pose), limits=True)
+    assert found.limits is not None
+    assert np.shape(found.limits.ok) == batch
+    np.testing.assert_allclose(found.limits.share, gough.limits(platform, pose).share, atol=1e-6)
+    if batch:
+        assert found[0].limits is not None
+        table = found.to_frame("pyarrow")
+        assert table.column_names[-2:] == ["margin", "limit"]
+        assert table["limit"].to_pylist() == np.ravel(found.limits.limit).tolist()
+    assert gough.solve(platform, platform.home_legs).limits is None

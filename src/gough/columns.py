@@ -16,6 +16,7 @@ ROTATIONS = (QUATERNION, EULER, EULER_DEG)
 ROTATION_TEXT = "qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg"
 STATUS, RESIDUAL, ITERATIONS, RADIUS = "status", "residual", "iterations", "radius"
 EVENT = "event"
+MARGIN, LIMIT = "margin", "limit"  # of the tightest limit
 DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
 Angles = Literal["deg", "rad"]
 
@@ -114,10 +115,15 @@ def deviation_names(angles: Angles | None) -> tuple[str, ...]:
 
 
 def solution_names(
-    angles: Angles | None, covariance: bool, radius: bool, event: bool = False
+    angles: Angles | None,
+    covariance: bool,
+    radius: bool,
+    event: bool = False,
+    limits: bool = False,
 ) -> tuple[str, ...]:
     """The columns of solved rows in files and tables."""
     optional = deviation_names(angles) * covariance + (RADIUS,) * radius + (EVENT,) * event
+    optional += (MARGIN, LIMIT) * limits
     return (*pose_names(angles), STATUS, RESIDUAL, ITERATIONS, *optional)
 
 

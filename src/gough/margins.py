@@ -63,11 +63,16 @@ class Limits:
         return np.where(no_pose, np.nan, least)[()]
 
     @property
-    def limit(self) -> Any:
-        """Name (...) of the limit that is nearest, such as "legs 2 and 3: clearance"."""
+    def tightest_part(self) -> NDArray[np.uint8]:
+        """Index (...) in `gough.margins.TEXTS` of the limit that is nearest."""
         nearest = self.share == np.expand_dims(self.tightest, -1)
         part = np.min(np.where(nearest, self.part, NO_PART), axis=-1, initial=NO_PART)
-        texts = part_text(part)
+        return np.where(part == NO_PART, len(LABELS), part).astype(np.uint8)
+
+    @property
+    def limit(self) -> Any:
+        """Name (...) of the limit that is nearest, such as "legs 2 and 3: clearance"."""
+        texts = TEXTS[self.tightest_part]
         return texts if texts.ndim else str(texts)
 
     def of(self, name: str) -> Array:
@@ -99,15 +104,16 @@ class Limits:
 def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None) -> Limits:
     """Calculate how far poses are from every limit of their machine.
 
-    | limit | margin | share 1 |
-    |---|---|---|
-    | stroke | reading to the nearer end [platform unit], [rad] | middle of the stroke |
-    | arm | rod length to where arm and rod no longer reach [platform unit] | one arm length |
-    | base joint, platform joint | cone minus angle from the joint's axis [rad] | on the axis |
-    | clearance | gap of two legs minus `clearance` [platform unit] | the gap at home |
-    | leg force | force to the nearer end of `leg_force` | middle of the range |
-    | workspace | to the nearest face of the box [platform unit], [rad] | middle of the box |
-    | singularity | determinant of the unit-free Jacobian, with home's sign | that of home |
+    Their margins, and where their share is 1:
+
+    - stroke: the reading's distance from the nearer end [platform unit], [rad]; in the middle
+    - arm: by how much the rod is clear of being too short or too long for its arm [platform
+      unit]; at one arm length
+    - base joint, platform joint: cone minus angle from the joint's axis [rad]; on the axis
+    - clearance: gap of two legs minus radii and `clearance` [platform unit]; as at home
+    - leg force: its distance from the nearer end of `leg_force`; in the middle
+    - workspace: distance from the nearest face of the box [platform unit], [rad]; in the middle
+    - singularity: determinant of the unit-free Jacobian, with home's sign; as at home
 
     A machine has the limits that its file states, `arm` if it has motor arms, and `singularity`
     unless home is singular.

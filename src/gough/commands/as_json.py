@@ -58,6 +58,7 @@ def report_facts(report: Report, platform: Platform, rows: list[dict]) -> dict:
         "invalid": report.invalid,
         "unlikely": report.unlikely,
         "events": _events(report),
+        **_limit_facts(report),
         "first_rows": rows,
     }
 
@@ -70,9 +71,20 @@ def _events(report: Report) -> dict | None:
     return {event.label: report.events[event] for event in Event if report.events[event]}
 
 
+def _limit_facts(report: Report) -> dict:
+    if report.margin is None:
+        return {}
+    margin, limit = report.tightest
+    return {"limits": {"rows_beyond": report.broken, "margin": margin, "limit": limit}}
+
+
 def first_poses(report: Report, angles: Angles | None) -> list[dict]:
     """The first poses of a report, by the names of their columns."""
-    return _rows(report, pose_names(angles), pose_values(report.pose, angles))
+    rows = _rows(report, pose_names(angles), pose_values(report.pose, angles))
+    if report.margin is not None:
+        for row, margin, limit in zip(rows, report.margin, report.limit, strict=True):
+            row |= {"margin": margin, "limit": limit}
+    return rows
 
 
 def first_legs(report: Report) -> list[dict]:

@@ -95,6 +95,10 @@ def print_summary(report: Report, platform: Platform, out: str | None, screen: C
     screen.print(table)
     for i in found:
         screen.print(f"{report.outcomes[i].label}: {report.outcomes[i].text}", markup=False)
+    if report.margin is not None and report.tightest[1]:
+        share, limit = report.tightest
+        left = f"{share:.3g} of the tightest is left ({limit})"
+        screen.print(f"limits: {report.broken:,} rows beyond one; {left}", markup=False)
     print_events(report, screen)
 
 
@@ -152,6 +156,11 @@ def print_poses(report: Report, platform: Platform, screen: Console) -> None:
     for row in _fitting_rows(report, _decimals(platform.size)):
         table.add_row(*row)
     screen.print(table)
+    if report.margin is not None:
+        table = plain_table(">row", ">margin", "tightest limit")
+        for i, (margin, limit) in enumerate(zip(report.margin, report.limit, strict=True)):
+            table.add_row(str(i + 1), f"{margin:.3f}", limit)
+        screen.print(table)
 
 
 def _fitting_rows(report: Report, places: int) -> list[list[str]]:

@@ -32,6 +32,7 @@ def run(
     max_iterations: Annotated[int, arg(metavar="N")] = 60,
     workers: Annotated[int | None, option(metavar="N")] = None,
     leg_noise: Annotated[float | None, option(metavar="S")] = None,
+    limits: Annotated[bool, option()] = False,
     angles: Annotated[Literal["deg", "rad"] | None, option(metavar="deg|rad")] = None,
     keep: Keep = "",
     follow: Annotated[bool, option()] = False,
@@ -66,6 +67,9 @@ def run(
         leg_noise: Add the standard deviations of the pose that readings with this standard
             deviation (in their unit) cause; those of rotations are in the unit of --angles, else
             in radians.
+        limits: Add the margin that is left of the tightest limit of joints, legs, forces, stroke
+            and workspace, as a share (1 in the middle, 0 at the limit), and its name. A platform
+            whose file has a table [limits] needs no option for that.
         angles: Write Euler angles, R = Rx Ry Rz, in this unit instead of quaternions.
         follow: Take rows for consecutive: start each at the pose before, and write an event of
             each, such as followed, found or jumped. Rows whose pose is not taken have none.
@@ -82,9 +86,9 @@ def run(
     from gough.platform import Platform
 
     given = legs_given(legs)
-    limits = {"max_shift": max_shift, "max_turn": max_turn and math.radians(max_turn)}
-    limits = {name: value for name, value in limits.items() if value is not None}
-    if limits and not follow:
+    allowed = {"max_shift": max_shift, "max_turn": max_turn and math.radians(max_turn)}
+    allowed = {name: value for name, value in allowed.items() if value is not None}
+    if allowed and not follow:
         raise InputError("--max-shift, --max-turn: limits of --follow; pass it, or leave them out")
     machine = Platform.load(platform)
     with show.progress_bar() as progress:
@@ -92,7 +96,7 @@ def run(
             given, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
             reading=reading.of(platform, keep),
             head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
-            workers=workers, frame=frame, follow=limits if follow else None,
+            workers=workers, frame=frame, follow=allowed if follow else None, limits=limits or None,
         )  # fmt: skip
     if json:
         poses = as_json.first_poses(report, angles)

@@ -64,6 +64,7 @@ def solve_file(
     certify: bool = False,
     ambiguous: bool = False,
     follow: Mapping[str, float] | None = None,
+    limits: bool | None = None,
     **settings: object,
 ) -> Report:
     """Solve a file of leg readings, row for row.
@@ -74,15 +75,16 @@ def solve_file(
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones, the
             pose, status, residual [platform unit], iterations; with `leg_noise` std_x, std_y,
             std_z [platform unit], std_rx, std_ry, std_rz [rad], or std_rx_deg to std_rz_deg with
-            angles "deg"; with `certify` the radius of
-            uniqueness [platform unit].
+            angles "deg"; with `certify` the radius of uniqueness [platform unit]; with `limits` the
+            margin and the name of the tightest limit.
         platform: the machine.
         reading: options for reading the file.
         angles: write Euler angles (R = Rx Ry Rz) in these units instead of quaternions.
         leg_noise: standard deviation of the readings, in their unit.
         head: number of first rows that the report holds.
         progress: called after every block with the file and the counts so far.
-        certify, ambiguous: as for `gough.solve`.
+        certify, ambiguous, limits: as for `gough.solve`; limits are those of the platform's file
+            where it states any, unless this says otherwise.
         follow: rows are consecutive, and each starts at the pose before; arguments of
             `gough.Tracker`, such as max_shift, or {}. Adds the column event.
         settings: of `gough.Solver`: seed, tolerance, max_iterations and others.
@@ -99,7 +101,8 @@ def solve_file(
 
     frame: Any = settings.get("frame")
     report = Report(tuple(Status), head, frame or "")
-    written = solution_names(angles, leg_noise is not None, certify, follow is not None)
+    limits = platform.limits is not None if limits is None else limits
+    written = solution_names(angles, leg_noise is not None, certify, follow is not None, limits)
     with _open_job(legs, out, platform, reading, file_leg_columns, written, frame) as job:
         solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
         tracker = None if follow is None else _tracker(platform, settings, follow)
@@ -111,11 +114,15 @@ def solve_file(
                 report.start()
             if tracker:
                 solution = tracker.follow(readings, leg_noise=leg_noise)
+                solution = solution.with_limits(platform) if limits else solution
                 solution = solution.in_frame(platform, frame) if frame else solution
             else:
                 solution = solver(
-                    readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous
-                )
+                    readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous,
+                    limits=limits,
+                )  # fmt: skip
+            if solution.limits is not None:
+                report.add_limits(solution.limits, solution.status)
             report.add(solution.pose, readings, solution.status, solution.residual, solution.event)
             invalid = solution.status == Status.INVALID_INPUT
             report.describe_invalid(block, invalid, lambda i, legs=readings: _leg_fault(legs[i]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from gough.errors import GoughError
 from gough.files.rows import Block
 from gough.pose import Pose
 from gough.status import Event, Outcome
+
+if TYPE_CHECKING:
+    from gough.margins import Limits
 
 DESCRIBED = 5  # invalid rows that are described one by one
 
@@ -36,6 +40,10 @@ class Report:
         pose, legs, status, event: the first rows, at most `head`; no events where there are none.
         seconds: time taken by the rows.
         frame: whose poses those are, such as "tool in work"; "" for the platform's.
+        margin, limit: of the first rows, share that is left of the tightest limit and its name;
+            None where limits are not asked for.
+        broken: usable rows beyond a limit.
+        tightest: least share that a usable row leaves of a limit, and the limit's name.
         compiling: time taken by compiling the solver, which is not in `seconds`.
     """
 
@@ -53,6 +61,10 @@ class Report:
     legs: Array = field(default_factory=lambda: np.empty((0, 6)))
     status: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     event: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
+    margin: Array | None = None
+    limit: list[str] = field(default_factory=list)
+    broken: int = 0
+    tightest: tuple[float, str] = (np.inf, "")
     seconds: float = 0.0
     compiling: float = 0.0
 
@@ -111,6 +123,19 @@ class Report:
         self.status = np.concatenate([self.status, status[part]])
         self.compiling = compiling.seconds() - self._compiled_before
         self.seconds = time.perf_counter() - compiling.seconds() - self._start
+
+    def add_limits(self, limits: Limits, status: NDArray[np.uint8]) -> None:
+        """Count the limits that rows of a block break; it comes before `add`."""
+        usable = np.isin(status, [i for i, outcome in enumerate(self.outcomes) if outcome.usable])
+        share = np.where(usable, limits.tightest, np.nan)
+        self.broken += int(np.sum(usable & ~limits.ok))
+        if np.any(share < self.tightest[0]):
+            row = int(np.nanargmin(share))
+            self.tightest = float(share[row]), str(limits.limit[row])
+        part = slice(0, max(self.head - len(self.status), 0))
+        kept = [] if self.margin is None else self.margin
+        self.margin = np.concatenate([kept, limits.tightest[part]])
+        self.limit += limits.limit[part].tolist()
 
     def describe_invalid(
         self, block: Block, rows: NDArray[np.bool_], fault: Callable[[int], str]

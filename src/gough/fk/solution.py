@@ -20,6 +20,8 @@ from gough.text import number, page, pose_heads, rows_of, with_unit
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from gough.margins import Limits
+
 LABELS = tuple(status.label for status in Status)
 EVENTS = tuple(event.label for event in Event)
 NEW = tuple(event for event in Event if event.usable)  # events that give a new pose
@@ -43,6 +45,8 @@ class Solution:
         table: library and row labels of the table of readings, if they came in one.
         event: (N,) uint8, to be compared with `Event` members, if rows were followed one after
             another; else None.
+        limits: margins (...) of the poses to what their machine allows, see `gough.limits`; None
+            without `limits=True`.
     """
 
     pose: Pose
@@ -55,6 +59,7 @@ class Solution:
     frame: str = ""
     table: TableInfo | None = None
     event: NDArray[np.uint8] | None = None
+    limits: Limits | None = None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -76,7 +81,20 @@ class Solution:
             self.pose[index], self.status[index], self.residual[index], self.iterations[index],
             covariance, radius, self.unit, self.frame, self.table and self.table.at(index),
             None if self.event is None else self.event[index],
+            self.limits and self.limits[index],
         )  # fmt: skip
+
+    def with_limits(self, platform: Platform, *, workers: int | None = None) -> Solution:
+        """Return the solution with the margins of its poses; see `gough.limits`.
+
+        Raises:
+            GoughError: the poses are those of a frame, not of the platform.
+        """
+        from gough.margins import limits
+
+        if self.frame:
+            raise GoughError(f"limits: these are the poses of {self.frame!r}, not of the platform")
+        return replace(self, limits=limits(platform, self.pose, workers=workers))
 
     def in_frame(self, platform: Platform, name: str) -> Solution:
         """Return the solution with poses of a frame of the platform, and their covariance.
@@ -98,7 +116,8 @@ class Solution:
         x, y, z [platform unit], qw, qx, qy, qz, status (a word), residual [platform unit],
         iterations; with a covariance the standard deviations std_x, std_y, std_z [platform
         unit], std_rx, std_ry, std_rz [rad], or std_rx_deg to std_rz_deg [deg] if the angles are in
-        degrees; with certificates radius [platform unit].
+        degrees; with certificates radius [platform unit]; with limits margin (the share of the
+        tightest limit that is left, negative beyond it) and limit (its name).
 
         Args:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
@@ -158,8 +177,22 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
         numbers += list(deviations.T)
     if solution.radius is not None:
         numbers.append(np.ravel(solution.radius))
+    limits = _limit_columns(solution.limits)
     status = label_column(np.ravel(solution.status), LABELS)
     columns = [*pose_table(solution.pose, angles).values(), status, *map(number_column, numbers)]
     if solution.event is not None:
         columns.append(label_column(solution.event, EVENTS))
-    return dict(zip(solution_names(angles, *optional), columns, strict=True))
+    names = solution_names(angles, *optional, bool(limits))
+    return dict(zip(names, [*columns, *limits], strict=True))
+
+
+def _limit_columns(limits: Limits | None) -> list[pa.Array]:
+    """Share and name of the tightest limit of each row."""
+    if limits is None:
+        return []
+    from gough.margins import TEXTS
+
+    return [
+        number_column(np.ravel(limits.tightest)),
+        label_column(np.ravel(limits.tightest_part), TEXTS.tolist()),
+    ]

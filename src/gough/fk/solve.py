@@ -47,6 +47,7 @@ def solve(
     certify: bool = False,
     ambiguous: bool = False,
     follow: bool = False,
+    limits: bool = False,
 ) -> Solution:
     """Poses that have the given leg readings, each with a status.
 
@@ -73,9 +74,10 @@ def solve(
             seed = platform.frame(frame).platform_pose(seed)
         tracker = make_tracker(platform, seed, tolerance=tolerance, singular=singular)
         found = tracker.follow(legs, leg_noise=leg_noise)
+        found = found.with_limits(platform) if limits else found
         return found.in_frame(platform, frame) if frame else found
     solver = Solver(platform, seed, tolerance, max_iterations, restarts, singular, workers, frame)
-    return solver(legs, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous)
+    return solver(legs, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous, limits=limits)
 
 
 def make_tracker(platform: Platform, seed: str | Seed | Pose, **limits: float | None) -> Tracker:
@@ -177,6 +179,7 @@ class Solver:
         leg_noise: ArrayLike | None = None,
         certify: bool = False,
         ambiguous: bool = False,
+        limits: bool = False,
     ) -> Solution:
         """Solve every row of readings.
 
@@ -196,6 +199,7 @@ class Solver:
                 takes hundreds of times as long) and call a usable row AMBIGUOUS where one of
                 them could be the machine's too: in the workspace, with home's sign of det J.
                 Done for every row where home is singular, since nothing else tells then.
+            limits: fill `Solution.limits` with the margins of the poses; see `gough.limits`.
 
         Returns:
             Solution: batch axes as those of `legs`; (N,) for a table.
@@ -222,9 +226,11 @@ class Solver:
         radius = self._certify(flat, rows) if certify else None
         batch = readings.shape[:-1]
         found = _solution(self.platform, rows, radius, batch, leg_noise, table_info(legs))
+        if limits:
+            found = found.with_limits(self.platform, workers=self.workers)
         return found if self.frame is None else found.in_frame(self.platform, self.frame)
 
-    def compile(self, count: int = 1, *, certify: bool = False) -> None:
+    def compile(self, count: int = 1, *, certify: bool = False, limits: bool = False) -> None:
         """Compile, or load from disk, all that a batch of `count` rows may need.
 
         The first call compiles what its rows need, and the first row that Newton's method does
@@ -232,7 +238,7 @@ class Solver:
         """
         legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
         solver = replace(self, seed="home")
-        solver(legs, certify=certify)
+        solver(legs, certify=certify, limits=limits)
         start = starting_poses(self.platform, solver.seed, legs)
         solver._solve_rows(legs, np.arange(1), start, Rows.empty(len(legs)))
 
