@@ -83,8 +83,11 @@ def joint_angles(
         mujoco.mj_kinematics(model, data)
         seen.append(np.array([[_seen(model, data, a, b, i) for i in range(6)]
                               for a, b in (("b", "p"), ("p", "b"))]))  # fmt: skip
-    return tuple(np.array([_turn(a, b) for a, b in zip(*side, strict=True)])
-                 for side in zip(*seen, strict=True))  # fmt: skip
+    lower, upper = (
+        np.array([_turn(a, b) for a, b in zip(*side, strict=True)])
+        for side in zip(*seen, strict=True)
+    )
+    return lower, upper
 
 
 def spring_forces(platform: Platform, pose: Pose, away: Pose, springs: Floats) -> Floats:

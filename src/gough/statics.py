@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array, as_batch
 from gough.errors import GoughError, PlatformError
@@ -248,7 +248,7 @@ def _leg_jacobian(platform: Platform, pose: Pose) -> Array:
     return jacobian(platform, pose) * platform.gain[:, None]
 
 
-def _inverse(matrices: Array) -> tuple[Array, Array, Array]:
+def _inverse(matrices: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Inverses (..., 6, 6), which of them are regular, and which matrices are finite."""
     known = np.all(np.isfinite(matrices), axis=(-2, -1))
     values = np.linalg.svd(np.where(known[..., None, None], matrices, 0.0), compute_uv=False)
