@@ -182,7 +182,7 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
     columns = [*pose_table(solution.pose, angles).values(), status, *map(number_column, numbers)]
     if solution.event is not None:
         columns.append(label_column(solution.event, EVENTS))
-    names = solution_names(angles, *optional, bool(limits))
+    names = solution_names(angles, *optional, limits=bool(limits))
     return dict(zip(names, [*columns, *limits], strict=True))
 
 
