@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.csv as pacsv
@@ -14,6 +15,7 @@ import pytest
 import gough as library
 from gough.columns import LEGS
 from gough.commands import COMMANDS
+from gough.units import scaled
 
 from .conftest import EXAMPLE, process
 
@@ -184,6 +186,27 @@ def test_paths_that_cannot_be_used_are_one_line_errors(gough, tmp_path, where):
         code, text, err = gough("solve", legs, "-p", "rubin_camera", "-o", out)
         assert (code, text, len(err.splitlines())) == (2, "", 1)
         assert err.startswith(f"gough solve: error: {path}: ")
+
+
+def test_statuses_are_whole_at_80_columns(gough, tmp_path):
+    """A machine whose positions take many digits: fewer are shown, the status never is cut."""
+    reference = library.Platform.load("reference")
+    large = scaled(replace(reference, stroke=(500, 700)), 1e5, "um")
+    large.save(tmp_path / "large.toml")
+    rows = np.array([np.full(6, 655.0), np.full(6, 695.0), np.full(6, 760.0)]) * 1e5
+    text = "\n".join(",".join(f"{v}" for v in row) for row in rows)
+    (tmp_path / "legs.csv").write_text(",".join(LEGS) + "\n" + text + "\n")
+    done = gough("solve", tmp_path / "legs.csv", "-p", tmp_path / "large.toml")
+    lines = done.out.splitlines()
+    assert [line.split()[-1] for line in lines[2:5]] == [
+        "converged", "converged", "outside_stroke",
+    ]  # fmt: skip
+    assert max(map(len, lines)) <= 80
+    wide = replace(large, workspace=large.with_workspace(1e5, 1).workspace, stroke=None)
+    wide.save(tmp_path / "large.toml")
+    lines = gough("solve", tmp_path / "legs.csv", "-p", tmp_path / "large.toml").out.splitlines()
+    assert lines[4].split()[-1] == "outside_workspace"
+    assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.process
