@@ -9,6 +9,7 @@ not. Inside the stated workspace, where the machine is meant to go, the sign at 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
 
@@ -29,7 +30,9 @@ TRANSLATION_STEP = 0.02  # share of the platform's size
 ROTATION_STEP = 0.05  # [rad]
 MOST_POINTS = 64
 SAME_TIP = 1e-6  # share of the size within which two places of a motor arm's tip are the same
-SURE_BOX = (0.2, 40.0)  # half widths of the largest sure workspace: share of the size, [deg]
+# Half widths of the boxes that may be the sure workspace: shares of the size, and [deg].
+SURE_WIDTHS = (0.2, 0.15, 0.1, 0.06, 0.03, 0.01, 0.003)
+SURE_ANGLES = (40.0, 30.0, 20.0, 10.0, 5.0, 2.0, 0.5)
 SAMPLED = 1_000  # poses of it that are looked at, beside its corners
 
 
@@ -77,27 +80,30 @@ def reached_from(platform: Platform, start: Pose, pose: Pose) -> NDArray[np.bool
 
 @lru_cache(maxsize=256)
 def sure_workspace(platform: Platform) -> Workspace | None:
-    """Return a box about home in which no pose was found on the other side of a singularity.
+    """Return a large box about home without any pose found on the other side of a singularity.
 
     It serves machines that state no workspace: poses in it need no closer look. None where home
     is singular, and every pose may be the machine's.
     """
     if not home_sign(platform):
         return None
-    corners = np.array(list(product((-1.0, 1.0), repeat=6)))
-    width, angle = SURE_BOX[0] * platform.size, SURE_BOX[1]
-    while width > SLACK * platform.size:
-        box = Workspace.about_home(width, angle)
-        turn = quaternion.from_euler(np.radians(angle) * corners[:, 3:])
-        drawn = box.sample(platform.home, SAMPLED, seed=0)
-        pose = Pose.trusted(
-            np.concatenate([platform.home.position + width * corners[:, :3], drawn.position]),
-            np.concatenate([quaternion.product(platform.home.wxyz, turn), drawn.wxyz]),
-        )
-        if not np.any(assembly_sign(platform, pose) < 0):
+    sizes = sorted(product(SURE_WIDTHS, SURE_ANGLES), key=lambda size: -size[0] * size[1])
+    for share, angle in sizes:
+        box = Workspace.about_home(share * platform.size, angle)
+        if not any(np.any(assembly_sign(platform, pose) < 0) for pose in _poses_of(platform, box)):
             return box
-        width, angle = width / 2, angle / 2
     return Workspace.about_home(0.0, 0.0)
+
+
+def _poses_of(platform: Platform, box: Workspace) -> Iterator[Pose]:
+    """The corners of a box about home, then poses in it."""
+    corners = np.array(list(product((0, 1), repeat=6)))
+    turn = quaternion.from_euler(np.radians(box.rotation_deg[range(3), corners[:, 3:]]))
+    shift = box.translation[range(3), corners[:, :3]]
+    yield Pose.trusted(
+        platform.home.position + shift, quaternion.product(platform.home.wxyz[None], turn)
+    )
+    yield box.sample(platform.home, SAMPLED, seed=0)
 
 
 def pose_status(platform: Platform, pose: Pose, legs: Array) -> NDArray[np.uint8]:
