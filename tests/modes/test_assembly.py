@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import balls
@@ -252,3 +253,10 @@ def test_start_system_is_part_of_the_package():
     import gough.modes
 
     assert (Path(gough.modes.__file__).parent / "start_system.npz").is_file()
+
+
+def test_a_machine_that_is_too_badly_scaled_is_refused():
+    camera = gough.Platform.load("rubin_camera")
+    far = replace(camera, home=gough.Pose((1000.0, 0, 0)), stroke=None, workspace=None)
+    with pytest.raises(gough.GoughError, match="no pose of 'rubin_camera' was found"):
+        gough.assembly_modes(far, far.home_legs)

@@ -23,6 +23,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from gough.errors import GoughError
 from gough.kernel.paths import LOST, Complex, LegEquations, track_paths
 from gough.kinematics import normalised_jacobian
 from gough.modes.frames import Frames, distances, distinct, inverse
@@ -101,6 +102,11 @@ def find_start_system(platform: Platform, seed: int = SEED) -> StartSystem:
     poses, history = _from_generic(at, rng)
     poses, loops = complete_by_loops(poses, at, _readings_of(platform, frames, WIDE), rng, LOOPS)
     count, paired = len(poses), False
+    if not count:
+        raise GoughError(
+            f"no pose of {platform.name!r} was found from any readings: its home is far from its "
+            "base or too close to a singularity to calculate with; choose another home"
+        )
     if frames.mirror is not None:
         first = _first_of_pairs(frames, poses)
         paired = 2 * len(first) == count
