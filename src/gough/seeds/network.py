@@ -114,7 +114,8 @@ class NetworkSeed:
         parts = [flat[i : i + CHUNK] for i in range(0, len(flat), CHUNK)]
         raw = [run(self._session, self._where, {"legs": part})[0] for part in parts]
         outputs = np.concatenate([*raw, np.zeros((0, WIDTHS[self._rotation]))])
-        return self._decode(outputs.reshape(*legs.shape[:-1], outputs.shape[-1]))
+        with np.errstate(all="ignore"):  # a network of wild weights gives no finite numbers
+            return self._decode(outputs.reshape(*legs.shape[:-1], outputs.shape[-1]))
 
     def outside(self, legs: Array) -> NDArray[np.bool_]:
         """Return which rows (N,) have a reading outside the range trained on, or NaN."""
