@@ -41,14 +41,14 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "gough.cli", *map(str, arguments)]
 
 
-def process(*arguments: object, **options) -> Result:
+def process(*arguments: object, timeout: float = 120, **options) -> Result:
     """Run a command in a process of its own."""
     done = subprocess.run(
         command(*arguments),
         check=False,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=timeout,
         env=environment(),
         **options,
     )

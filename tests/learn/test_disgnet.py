@@ -1,5 +1,8 @@
-import numpy as np
-import pytest
+"""The nonlinear reading of DisGNet: its three forms, and what one 2-FWL step can express."""
+
+from itertools import combinations
+from typing import Any
+
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -7,6 +10,11 @@ from learn.networks import network, reference
 from machines import random_platform
 
 from gough import leg_lengths
+from gough.learn.models import Scaling, build
+
+
+def small(platform, seed=0, **options):
+    return network("disgnet", platform, seed, width=12, initial=1, bumps=8, **options)
 
 
 def gradients(model, value):
@@ -15,61 +23,69 @@ def gradients(model, value):
     return {n: p.grad.clone() for n, p in model.named_parameters() if p.grad is not None}
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.integers(0, 10**6))
 def test_structured_equals_dense_to_rounding_with_gradients(seed):
-    platform = random_platform(seed)
-    model = network("disgnet", platform, seed, width=24)
+    model = small(random_platform(seed), seed)
     torch.manual_seed(seed)
-    x, weight = torch.randn(7, 6).double(), torch.randn(7, 12).double()
-    x.requires_grad_()
-    out, grads, into = {}, {}, {}
+    x, weight = torch.randn(4, 6).double(), torch.randn(4, 12).double()
+    out, grads = {}, {}
     for form in ("dense", "structured"):
         model.form = form
         out[form] = model.network(x)
         grads[form] = gradients(model, (out[form] * weight).sum())
-        into[form], x.grad = torch.as_tensor(x.grad).clone(), None
     scale = out["dense"].abs().max()
-    assert (out["dense"] - out["structured"]).abs().max() <= 1e-12 * scale
-    assert (into["dense"] - into["structured"]).abs().max() <= 1e-12 * into["dense"].abs().max()
+    assert (out["dense"] - out["structured"]).abs().max() <= 1e-11 * scale
     for name, grad in grads["dense"].items():
-        assert (grad - grads["structured"][name]).abs().max() <= 1e-12 * max(
-            1.0, grad.abs().max()
-        ), name
+        other = grads["structured"][name]
+        assert (grad - other).abs().max() <= 1e-10 * max(1.0, grad.abs().max()), name
 
 
-def test_structured_equals_dense_at_the_published_size():
+def test_structured_equals_dense_at_the_papers_size():
     model = network("disgnet", reference(), 3)
-    x = torch.randn(3, 6).double()
+    assert model.parameter_count() <= 140_000
+    x = torch.randn(2, 6).double()
     structured = model.network(x)
     model.form = "dense"
-    torch.testing.assert_close(model.network(x), structured, rtol=1e-12, atol=1e-12)
+    torch.testing.assert_close(model.network(x), structured, rtol=1e-11, atol=1e-11)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.permutations(range(12)))
 def test_permuting_nodes_with_their_numbers_changes_nothing(order):
-    model = network("disgnet", reference(), width=16)
+    model = small(reference())
     order = torch.tensor(order)
-    E = model.matrix(model.edges(torch.randn(4, 6).double()))
+    E = model.matrix(model.edges(torch.randn(2, 6).double()))
     straight = model.dense(E, torch.arange(12))
     permuted = model.dense(E[:, order][:, :, order], order)
-    torch.testing.assert_close(permuted, straight, rtol=1e-12, atol=1e-12)
-    if order.tolist() != list(range(12)):  # the numbers matter
-        wrong = model.dense(E[:, order][:, :, order], torch.arange(12))
-        assert (wrong - straight).abs().max() > 1e-6
+    torch.testing.assert_close(permuted, straight, rtol=1e-11, atol=1e-11)
 
 
 def test_dense_takes_any_graph():
-    model = network("disgnet", reference(), width=16)
+    model = small(reference())
     E = torch.rand(2, 12, 12).double()
-    E = E + E.mT
-    assert model.dense(E, torch.arange(12)).shape == (2, 12)
+    assert model.dense(E + E.mT, torch.arange(12)).shape == (2, 12)
 
 
-def test_what_is_read_out_is_a_sum_of_functions_of_single_legs():
-    """Why the head alone has to learn how legs act together; see the module's docstring."""
-    model = network("disgnet", reference(), width=16)
+@torch.no_grad()
+def test_tables_converge_to_the_exact_form():
+    platform = reference()
+    torch.manual_seed(0)  # as training starts; random weights of any size are less smooth
+    model: Any = build("disgnet", platform, Scaling.of(platform)).double().eval()
+    legs = torch.tensor(leg_lengths(platform, platform.sample_poses(50, 5)))
+    exact = model.raw(legs)
+    model.train()
+    off = []
+    for model.table in (8, 16, 32):
+        off.append(float((model.raw(legs) - exact).abs().max() / exact.abs().max()))
+    assert off[0] > 10 * off[1] > 100 * off[2]
+    assert off[2] < 1e-4
+    model.table = 0
+    torch.testing.assert_close(model.raw(legs), exact, rtol=1e-12, atol=1e-12)
+
+
+def pooled_of(model):
+    """Input of the readout as a function of one reading (6,)."""
     seen = []
     model.readout.register_forward_pre_hook(lambda module, args: seen.append(args[0].detach()))
 
@@ -77,31 +93,29 @@ def test_what_is_read_out_is_a_sum_of_functions_of_single_legs():
         model.network(x[None])
         return seen[-1][0]
 
-    x = torch.randn(6).double()
-    moves = 0.7 * torch.eye(6).double()
-    for i, j in ((0, 1), (1, 2), (0, 5), (2, 4)):
-        mixed = pooled(x + moves[i] + moves[j]) - pooled(x + moves[i]) - pooled(x + moves[j])
-        mixed += pooled(x)
-        assert mixed.abs().max() < 1e-12
-        assert (pooled(x + moves[i]) - pooled(x)).abs().max() > 1e-3
+    return pooled
 
 
-@pytest.mark.parametrize("form", ["dense", "structured"])
-def test_matrix_is_that_of_the_graph(form):
-    model = network("disgnet", reference(), width=16, form=form)
-    E = model.matrix(model.edges(torch.zeros(1, 6).double()))[0]
-    assert torch.equal(E, E.mT)
-    np.testing.assert_array_equal(E.numpy() > 0, model.graph.adjacency)
+@torch.no_grad()
+def mixed_difference(function, x, moves):
+    """Sum over all subsets of the moves, with alternating sign."""
+    total = torch.zeros(())
+    for count in range(len(moves) + 1):
+        for chosen in combinations(moves, count):
+            total = total + (-1) ** count * function(x + sum(chosen, torch.zeros_like(x)))
+    return total
 
 
-def test_tables_agree_with_the_exact_form():
-    platform = reference()
-    model = network("disgnet", platform)
-    legs = torch.tensor(leg_lengths(platform, platform.sample_poses(200, 5)))
-    exact = model.raw(legs)
-    model.train()
-    assert (model.raw(legs) - exact).abs().max() < 1e-4 * exact.abs().max()
-    model.table = 256
-    assert (model.raw(legs) - exact).abs().max() < 1e-8 * exact.abs().max()
-    model.table = 0
-    torch.testing.assert_close(model.raw(legs), exact, rtol=1e-12, atol=1e-12)
+def test_the_readout_is_a_sum_of_functions_of_two_legs_and_no_less():
+    pooled = pooled_of(small(reference()))
+    x, moves = torch.randn(6).double(), 0.7 * torch.eye(6).double()
+    for i, j, k in ((0, 1, 2), (0, 3, 5), (1, 2, 4)):
+        assert mixed_difference(pooled, x, [moves[i], moves[j], moves[k]]).abs().max() < 1e-11
+        assert mixed_difference(pooled, x, [moves[i], moves[j]]).abs().max() > 1e-4
+
+
+def test_its_constants_are_kept_with_its_weights():
+    model, other = small(reference(), 1), small(reference(), 2)
+    other.load_state_dict(model.state_dict())
+    x = torch.randn(3, 6).double()
+    assert torch.equal(model.network(x), other.network(x))

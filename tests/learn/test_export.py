@@ -22,7 +22,7 @@ from gough.seeds.network import NetworkSeed, _unseal, seal
 RECORD = {"seconds": 1.0, "steps": 20, "seed": 0}
 SIZES = {
     "resmlp": {"width": 16, "depth": 2}, "disgnet": {"width": 16},
-    "disgnet-nonlinear": {"width": 16},
+    "disgnet-linear": {"width": 16},
     "plain-mlp": {"width": 16, "depth": 1}, "wise-mlp": {"width": 16, "depth": 1},
     "gcn": {"width": 16, "layers": 1}, "graphmlp": {"width": 16, "blocks": 1, "hidden": 16},
 }  # fmt: skip

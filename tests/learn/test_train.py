@@ -66,7 +66,7 @@ def test_a_short_run_learns_and_leaves_all_files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "kind", ["disgnet", "disgnet-nonlinear", "plain-mlp", "gcn", "graphmlp", "wise-mlp"]
+    "kind", ["disgnet", "disgnet-linear", "plain-mlp", "gcn", "graphmlp", "wise-mlp"]
 )
 def test_every_network_learns(tmp_path, kind):
     options = {"width": 16} | ({"hidden": 32} if kind == "graphmlp" else {})

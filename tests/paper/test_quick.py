@@ -1,15 +1,16 @@
 """`gough paper --quick`, once and whole, and what can be done with its folder."""
 
 import json
+import os
 import re
 import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
-from cli.conftest import Result, command, environment
+from cli.conftest import gough, process  # noqa: F401 - a fixture
+from filelock import FileLock
 
 from gough.learn.models import MODELS
 from gough.learn.run_folder import load_tensors
@@ -20,20 +21,23 @@ from gough.platform import Platform
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def study(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("paper") / "study"
-    done = paper("-o", folder, "--quick")
-    assert done.code == 0, done.err
+    """The folder of a study, run once by all processes of pytest-xdist together."""
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent
+    folder = root / "study"
+    with FileLock(root / "study.lock"):
+        if not folder.exists():
+            done = process("paper", "-o", folder, "--quick", "--budget", "0.3s", timeout=1200)
+            assert done.code == 0, done.err
     return folder
 
 
-def paper(*arguments: object) -> Result:
-    done = subprocess.run(
-        command("paper", *arguments), check=False, capture_output=True, text=True,
-        env=environment(),
-    )  # fmt: skip
-    return Result(done.returncode, done.stdout, done.stderr)
+@pytest.fixture
+def paper(gough):  # noqa: F811
+    return lambda *arguments: gough("paper", *arguments)
 
 
 def test_every_table_is_filled_and_every_figure_there(study):
@@ -60,14 +64,17 @@ def test_the_page_stands_alone(study):
 
 def test_all_networks_had_their_steps(study):
     plan = Plan.load(study / "plan.json")
+    assert set(plan.steps) == set(MODELS)
     for name in SETS:
         for kind, steps in plan.steps.items():
+            if name != "full" and kind not in plan.others:
+                continue
             _, facts = load_tensors(study / "runs" / name / kind / "weights.safetensors")
             assert facts["record"]["steps"] == steps
             assert facts["record"]["samples"] == steps * 500
 
 
-def test_a_table_made_again_says_the_same(study, tmp_path):
+def test_a_table_made_again_says_the_same(paper, study, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(study / "results", copy / "results")  # no runs: the networks are enough
     for name in ("plan.json", "networks.json"):
@@ -81,16 +88,16 @@ def test_a_table_made_again_says_the_same(study, tmp_path):
         assert first == again, stage
 
 
-def test_other_networks_than_those_of_the_results_are_refused(study, tmp_path):
+def test_other_networks_than_those_of_the_results_are_refused(paper, study, tmp_path):
     copy = tmp_path / "networks"
     shutil.copytree(study / "networks", copy)
-    shutil.copy(copy / "90" / "gcn.onnx", copy / "80" / "gcn.onnx")
+    shutil.copy(copy / "90" / "disgnet.onnx", copy / "80" / "disgnet.onnx")
     done = paper("-o", study, "--stage", "sets", "--networks", copy)
     assert done.code == 2
-    assert "80/gcn.onnx: is not the network of this study" in done.err
+    assert "80/disgnet.onnx: is not the network of this study" in done.err
     sums = json.loads((study / "networks.json").read_text())
-    assert len(sums) == len(SETS) * len(MODELS)
-    assert sums["90/gcn.onnx"]["sha256"][:16] in (study / "index.md").read_text()
+    assert len(sums) == len(MODELS) + 3 * len(QUICK.others)
+    assert sums["90/disgnet.onnx"]["sha256"][:16] in (study / "index.md").read_text()
 
 
 def without_times(path: Path):
@@ -120,7 +127,7 @@ def test_a_training_made_again_gives_the_same_bits(study, tmp_path):
     assert all(torch.equal(first[name], second[name]) for name in first)
 
 
-def test_a_study_that_was_stopped_goes_on(study, tmp_path):
+def test_a_study_that_was_stopped_goes_on(paper, study, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(study, copy)
     (copy / "networks" / "80" / "wise-mlp.onnx").unlink()
@@ -144,14 +151,14 @@ def test_a_study_that_was_stopped_goes_on(study, tmp_path):
         (("--stage", "speed"), "invalid choice"),
     ],
 )
-def test_mistakes_are_told_in_a_line(study, arguments, words):
+def test_mistakes_are_told_in_a_line(paper, study, arguments, words):
     done = paper("-o", study, *arguments)
     assert done.code == 2
     assert words in done.err
     assert "Traceback" not in done.err
 
 
-def test_a_stage_without_networks_says_what_to_run(study, tmp_path):
+def test_a_stage_without_networks_says_what_to_run(paper, study, tmp_path):
     shutil.copy(study / "plan.json", tmp_path)
     done = paper("-o", tmp_path, "--stage", "sets")
     assert done.code == 2

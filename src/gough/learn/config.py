@@ -12,7 +12,7 @@ from typing import Any, Literal
 from gough.errors import GoughError
 
 Kind = Literal[
-    "resmlp", "disgnet", "disgnet-nonlinear", "plain-mlp", "wise-mlp", "gcn", "graphmlp"
+    "resmlp", "disgnet", "disgnet-linear", "plain-mlp", "wise-mlp", "gcn", "graphmlp"
 ]  # fmt: skip
 UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
@@ -67,6 +67,8 @@ class OptimiserConfig:
     """Steps over which the rate rises from zero, at most 5 % of the run."""
     hold: float = 0.3
     """Share of the run during which the rate is constant."""
+    refresh: int = 10
+    """Steps between refreshes of SOAP's bases."""
     average: float = 0.0
     """Decay of an exponential average of the weights, which becomes the result; 0: no average."""
 
@@ -183,7 +185,10 @@ def seconds(text: str) -> float:
 PRESETS: dict[str, TrainConfig] = {
     "default": TrainConfig(run=RunConfig(budget="10m")),
     "disgnet": TrainConfig(
-        model=ModelConfig("disgnet"), data=DataConfig(batch=1000), run=RunConfig(budget="30m")
+        model=ModelConfig("disgnet"),
+        data=DataConfig(batch=1000),
+        optimiser=OptimiserConfig(refresh=30),
+        run=RunConfig(budget="25m"),
     ),
     "wide": TrainConfig(data=DataConfig(same_assembly=True), run=RunConfig(budget="15m")),
     "paper": TrainConfig(

@@ -31,8 +31,11 @@ SIDES = ("left", "right")
 
 def make_optimiser(config: OptimiserConfig, model: nn.Module) -> Optimizer:
     """Create the optimiser that a configuration names."""
-    kind = {"soap": SOAP, "adam": torch.optim.Adam, "adamw": torch.optim.AdamW}[config.kind]
-    return kind(model.parameters(), lr=config.lr, weight_decay=config.weight_decay)
+    options = {"lr": config.lr, "weight_decay": config.weight_decay}
+    if config.kind == "soap":
+        return SOAP(model.parameters(), refresh=config.refresh, **options)
+    kind = {"adam": torch.optim.Adam, "adamw": torch.optim.AdamW}[config.kind]
+    return kind(model.parameters(), **options)
 
 
 class SOAP(Optimizer):

@@ -15,7 +15,7 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.learn.evaluate import DEGREES, Row, evaluate, median_time
+from gough.learn.evaluate import Row, evaluate, median_time
 from gough.learn.metrics import THRESHOLDS, measure
 from gough.paper.methods import Method, Success, batched, ours, scipy, sequential
 from gough.paper.published import GAMMAS
@@ -25,7 +25,6 @@ from gough.pose import Pose
 from gough.seeds.base import Seed
 from gough.seeds.polynomial import PolynomialSeed
 
-POLYNOMIALS = tuple(f"polynomial-{degree}" for degree in DEGREES)
 OTHER_F_MAX = (15, 17, 40)  # inner iterations that the iteration table tries
 WIDE_SOLVED = 10  # times W poses for the two-stage methods of the wide workspace
 FIT_GAMMA = GAMMAS[1]  # the precision level of the paper's timings
@@ -58,7 +57,7 @@ def sets(study: Study) -> dict:
     truth, legs = study.test_set()
     out = []
     for name in ("full", "90", "80"):
-        for kind in study.kinds:
+        for kind in study.kinds(name):
             guess = study.network(name, kind).guess(legs)
             found = asdict(measure(study.platform, guess, truth, legs))
             axis = _along_axes(np.abs(guess.position - truth.position))
@@ -106,8 +105,8 @@ def wide(study: Study) -> dict:
         rows = evaluate(machine, names, poses=study.plan.test, same_assembly=same)
         out[key] = [_network_row(row) for row in rows]
     truth, legs = study.test_set(WIDE_SOLVED * study.plan.solved, "wide", same_assembly=True)
-    seeds: list[Seed] = [PolynomialSeed(machine, degree) for degree in (0, *DEGREES)]
-    seeds += [study.network("wide", kind) for kind in study.kinds]
+    seeds: list[Seed] = [PolynomialSeed(machine, degree) for degree in (0, *study.plan.degrees)]
+    seeds += [study.network("wide", kind) for kind in study.kinds("wide")]
     for row, seed in zip(out["same"], seeds, strict=True):
         for key in ("batched", "scaled"):
             method = batched(machine, seed, scaled=key == "scaled")
@@ -136,7 +135,9 @@ def _along_axes(away: Array) -> dict:
 
 def _names(study: Study, name: str) -> list[str]:
     """First guesses of a table, as `evaluate` takes them."""
-    return ["home", *POLYNOMIALS, *(str(study.network_path(name, kind)) for kind in study.kinds)]
+    polynomials = (f"polynomial-{degree}" for degree in study.plan.degrees)
+    networks = (str(study.network_path(name, kind)) for kind in study.kinds(name))
+    return ["home", *polynomials, *networks]
 
 
 def _network_row(row: Row) -> dict:
@@ -156,7 +157,7 @@ def _network_row(row: Row) -> dict:
 def curves(study: Study) -> dict:
     """Errors of every network on 2,000 held-out poses while it trained on the full set."""
     out: dict[str, Any] = {}
-    for kind in study.kinds:
+    for kind in study.kinds("full"):
         path = study.curve_path(kind)
         try:
             with path.open(newline="") as file:
@@ -233,7 +234,7 @@ def poses(study: Study) -> dict:
 def errors(study: Study) -> dict:
     """Histograms of the errors on a log axis, of the guesses and after the second stage."""
     truth, legs = study.test_set()
-    guesses = {kind: study.network("full", kind).guess(legs) for kind in study.kinds}
+    guesses = {kind: study.network("full", kind).guess(legs) for kind in study.kinds("full")}
     found = {kind: guess.distance(truth) for kind, guess in guesses.items()}
     few = slice(0, 10 * study.plan.solved)
     second = batched(study.platform, _Guessed(guesses["disgnet"][few]))

@@ -20,7 +20,7 @@ import torch
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.learn.config import DataConfig, Kind, ModelConfig, RunConfig, TrainConfig
-from gough.learn.evaluate import held_out
+from gough.learn.evaluate import DEGREES, held_out
 from gough.learn.run_folder import CONFIG, METRICS, NETWORK, environment
 from gough.learn.train import Trainer, train
 from gough.platform import Platform
@@ -48,6 +48,8 @@ class Plan:
         test: number of held-out poses that errors are taken over.
         solved: number of these that the two-stage methods solve (W in the paper).
         sizes: first, last and step of the numbers of samples that are timed.
+        others: networks that are trained on the other sets than the full one too.
+        degrees: of the polynomials.
         seed: seed of training data and of the weights at the start.
         platform: digest of the platform.
         steps: number of steps of each network that the budget allows, by a timing on one machine.
@@ -58,6 +60,8 @@ class Plan:
     test: int = 100_000
     solved: int = 1000
     sizes: tuple[int, int, int] = (10, 1000, 10)
+    others: tuple[Kind, ...] = KINDS
+    degrees: tuple[int, ...] = DEGREES
     seed: int = 0
     platform: str = ""
     steps: dict[str, int] = field(default_factory=dict)
@@ -106,7 +110,8 @@ class Plan:
         """
         try:
             facts = json.loads(path.read_text())
-            return cls(**facts | {"sizes": tuple(facts["sizes"])})
+            lists = {k: tuple(v) for k, v in facts.items() if isinstance(v, list)}
+            return cls(**facts | lists)
         except OSError as error:
             raise GoughError(f"{path}: cannot be read: {error.strerror}") from None
         except (json.JSONDecodeError, TypeError, KeyError) as error:
@@ -114,7 +119,8 @@ class Plan:
 
 
 FULL = Plan()
-QUICK = Plan(budget=1.0, rows=20_000, test=2_000, solved=100, sizes=(10, 100, 10))
+QUICK = Plan(budget=1.0, rows=20_000, test=2_000, solved=100, sizes=(10, 100, 10),
+             others=("disgnet", "wise-mlp"), degrees=(3, 5))  # fmt: skip
 
 
 def with_workspace_of(platform: Platform, name: str) -> Platform:
@@ -152,15 +158,15 @@ class Study:
 
     # ---- networks ---------------------------------------------------------------------
 
-    @property
-    def kinds(self) -> list[Kind]:
-        """The networks that the plan states steps for."""
-        return [kind for kind in KINDS if kind in self.plan.steps]
+    def kinds(self, name: str) -> list[Kind]:
+        """The networks of one of the SETS, of those that the plan states steps for."""
+        wanted = KINDS if name == "full" else self.plan.others
+        return [kind for kind in wanted if kind in self.plan.steps]
 
     def train(self, sets: Iterable[str] = tuple(SETS), *, show: bool = True) -> None:
         """Train the networks of the SETS that are missing; a run that was stopped goes on."""
         for name in sets:
-            for kind in self.kinds:
+            for kind in self.kinds(name):
                 target = self.network_path(name, kind)
                 if target.exists():
                     continue
@@ -185,7 +191,7 @@ class Study:
 
     def sums(self) -> dict[str, dict]:
         """Size [bytes] and SHA-256 of each network that is there, by its path."""
-        paths = [self.network_path(name, kind) for name in SETS for kind in self.kinds]
+        paths = [self.network_path(name, kind) for name in SETS for kind in self.kinds(name)]
         contents = {p: p.read_bytes() for p in paths if p.exists()}
         return {
             p.relative_to(self.networks).as_posix(): {

@@ -5,14 +5,14 @@ from __future__ import annotations
 from gough.errors import GoughError
 from gough.learn.models.base import PoseNetwork, Scaling
 from gough.learn.models.disgnet import DisGNet
-from gough.learn.models.disgnet_nonlinear import NonlinearDisGNet
+from gough.learn.models.disgnet_linear import LinearDisGNet
 from gough.learn.models.graph import GCN, GraphMLP
 from gough.learn.models.mlp import PlainMLP, ResMLP, WiseMLP
 from gough.platform import Platform
 
 MODELS: dict[str, type[PoseNetwork]] = {
     model.kind: model
-    for model in (ResMLP, DisGNet, NonlinearDisGNet, PlainMLP, WiseMLP, GCN, GraphMLP)
+    for model in (ResMLP, DisGNet, LinearDisGNet, PlainMLP, WiseMLP, GCN, GraphMLP)
 }
 
 __all__ = ["MODELS", "PoseNetwork", "Scaling", "build"]

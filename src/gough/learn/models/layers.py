@@ -9,12 +9,21 @@ from torch import Tensor, nn
 
 
 class Dense(nn.Module):
-    """act(W norm(x) + b), plus x where input and output have the same width."""
+    """act(W norm(x) + b), plus x where input and output have the same width.
 
-    def __init__(self, inputs: int, outputs: int, *, norm: bool = True) -> None:
+    Args:
+        inputs: width of x.
+        outputs: width of the result.
+        norm: normalise x, where both widths are the same.
+        residual: add x, where both widths are the same.
+    """
+
+    def __init__(self, inputs: int, outputs: int, *, norm: bool = True,
+                 residual: bool = True) -> None:  # fmt: skip
         super().__init__()
-        self.residual = inputs == outputs
-        self.norm = nn.LayerNorm(inputs) if norm and self.residual else nn.Identity()
+        same = inputs == outputs
+        self.residual = residual and same
+        self.norm = nn.LayerNorm(inputs) if norm and same else nn.Identity()
         self.linear = nn.Linear(inputs, outputs)
 
     def forward(self, x: Tensor) -> Tensor:
