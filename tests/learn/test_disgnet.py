@@ -1,4 +1,4 @@
-"""The nonlinear reading of DisGNet: its three forms, and what one 2-FWL step can express."""
+"""DisGNet: its three forms, its norm, and what one 2-FWL step can express."""
 
 from itertools import combinations
 from typing import Any
@@ -11,6 +11,7 @@ from machines import random_platform
 
 from gough import leg_lengths
 from gough.learn.models import Scaling, build
+from gough.learn.models.two_legs import Product
 
 
 def small(platform, seed=0, **options):
@@ -68,20 +69,34 @@ def test_dense_takes_any_graph():
 
 
 @torch.no_grad()
-def test_tables_converge_to_the_exact_form():
+def test_tables_and_the_file_converge_to_the_exact_form_through_any_nodes():
     platform = reference()
     torch.manual_seed(0)  # as training starts; random weights of any size are less smooth
-    model: Any = build("disgnet", platform, Scaling.of(platform)).double().eval()
+    model: Any = build("disgnet", platform, Scaling.of(platform))
+    model.cast(torch.float64)
     legs = torch.tensor(leg_lengths(platform, platform.sample_poses(50, 5)))
-    exact = model.raw(legs)
-    model.train()
+    exact = model.eval().raw(legs)
     off = []
-    for model.table in (8, 16, 32):
-        off.append(float((model.raw(legs) - exact).abs().max() / exact.abs().max()))
+    for model.table in (6, 9, 12):
+        raw = [model.finish(model.tabulated(model.normalised(legs), s)) for s in (0.1, 0.5, 0.9)]
+        off.append(max(float((r - exact).abs().max() / exact.abs().max()) for r in raw))
     assert off[0] > 10 * off[1] > 100 * off[2]
     assert off[2] < 1e-4
+    file = model.for_export().raw(legs)
+    assert (file - exact).abs().max() < 1e-4 * exact.abs().max()
+    model.train()
     model.table = 0
     torch.testing.assert_close(model.raw(legs), exact, rtol=1e-12, atol=1e-12)
+
+
+@torch.no_grad()
+def test_the_norm_gives_mean_0_and_deviation_1_over_all_pairs_and_the_range():
+    model = small(reference())
+    angle = torch.rand(4000, 6).double() * torch.pi  # the cosine has the weight 1 / sqrt(1 - y^2)
+    edges = model.edges(model.range_middle + model.range_half * angle.cos())
+    m = Product(model, edges, *model.norm_of(edges)).all()
+    torch.testing.assert_close(m.mean((0, 1)), torch.zeros(12).double(), rtol=0, atol=0.03)
+    torch.testing.assert_close(m.var((0, 1)), torch.ones(12).double(), rtol=0.06, atol=0)
 
 
 def pooled_of(model):

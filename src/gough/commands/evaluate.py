@@ -51,7 +51,9 @@ def run(
     if workspace is not None:
         machine = machine.with_workspace(*workspace)
     if speed:
-        found = loop.measure_speed(machine)
+        from gough.learn.forms import measure_speed
+
+        found = measure_speed(machine)
         as_json.print_json(asdict(found)) if json else print("\n".join(found.lines()))
         return 0
     chosen = list(names) or loop.default_names(machine)
@@ -76,24 +78,23 @@ def _print(platform: Platform, rows: Sequence[Row]) -> None:
         markup=False, soft_wrap=True,
     )  # fmt: skip
     errors = plain_table(
-        "first guess", ">numbers", ">E-trans", ">median", ">worst", f">< 1 {unit}", ">E-rot",
+        "first guess", ">numbers", ">E-trans", ">median", ">worst", f"><1 {unit} %", ">E-rot",
         ">worst", ">E-ik",
     )  # fmt: skip
     ends = plain_table(
-        "first guess", ">true pose", ">other", ">twins", ">no end", ">solve", ">ms/1000",
+        "first guess", ">true %", ">other", ">twins", ">no end", ">solve", ">ms/1000",
         ">training s", ">seed",
     )  # fmt: skip
     for row in rows:
         m, n = row.metrics, row.newton
         name = row.name.rstrip("/").rpartition("/")[2][-14:]
-        values = [m.trans_mean, m.trans_median, m.trans_worst]
+        values = f"{m.trans_mean:.3g}", f"{m.trans_median:.2g}", f"{m.trans_worst:.2g}"
         errors.add_row(
-            name, _optional(row.parameters, ",d"), *(f"{v:.3g}" for v in values),
-            f"{100 * m.trans_within[1]:.4g} %",
-            *(f"{v:.3g}" for v in (m.rot_mean, m.rot_worst, m.ik_mean)),
+            name, _optional(row.parameters, ",d"), *values, f"{100 * m.trans_within[1]:.4g}",
+            f"{m.rot_mean:.2g}", f"{m.rot_worst:.2g}", f"{m.ik_mean:.3g}",
         )  # fmt: skip
         ends.add_row(
-            name, f"{100 * n.share:.4f} %", str(n.other), str(n.twins), str(n.unconverged),
+            name, f"{100 * n.share:.4f}", str(n.other), str(n.twins), str(n.unconverged),
             str(row.wrong), f"{1e3 * row.per_thousand:.2f}", _optional(row.seconds, ",.1f"),
             _optional(row.seed, "d"),
         )  # fmt: skip
@@ -105,6 +106,9 @@ def _print(platform: Platform, rows: Sequence[Row]) -> None:
         markup=False,
     )  # fmt: skip
     screen.print(ends)
+    for row in rows:
+        if row.forms is not None:
+            screen.print("\n" + row.forms.text(row.name, unit), markup=False)
 
 
 def _optional(value: float | None, spec: str) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -14,19 +13,26 @@ from gough.checks import Array
 from gough.errors import GoughError
 from gough.fk.solve import solve
 from gough.learn.data import DatasetSpec, dataset
-from gough.learn.metrics import Metrics, NewtonCounts, count_newton_ends, measure, same_pose
+from gough.learn.forms import Difference, difference
+from gough.learn.metrics import (
+    Metrics,
+    NewtonCounts,
+    count_newton_ends,
+    measure,
+    median_time,
+    same_pose,
+)
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.seeds import polynomial
 from gough.seeds.base import Seed, find_seed
-from gough.seeds.network import NetworkSeed, find_network, shipped_names
+from gough.seeds.network import find_network, shipped_names
 
 if TYPE_CHECKING:
     from gough.learn.config import TrainConfig
 
 HELD_OUT = 20_240_314  # seed of the test poses, which no training uses
 DEGREES = (3, 5, 7)
-EPOCH = 400_000  # samples, the paper's training set
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,7 @@ class Row:
         newton: where plain Newton ends, with no second try.
         wrong: rows that `gough.solve` from this guess, with all its tries, does not end at the
             true pose.
+        forms: distances between the forms of a network that has several; else None.
     """
 
     name: str
@@ -53,6 +60,7 @@ class Row:
     metrics: Metrics
     newton: NewtonCounts
     wrong: int
+    forms: Difference | None
 
 
 def default_names(platform: Platform) -> list[str]:
@@ -96,7 +104,7 @@ def _row(platform: Platform, name: str, truth: Pose, legs: Array) -> Row:
     return Row(
         name, parameters, seconds, number, median_time(lambda: seed.guess(some), 7),
         measure(platform, guess, truth, legs), count_newton_ends(platform, guess, truth, legs),
-        int(np.sum(~same_pose(platform, solved, truth))),
+        int(np.sum(~same_pose(platform, solved, truth))), difference(platform, name, guess, legs),
     )  # fmt: skip
 
 
@@ -120,17 +128,6 @@ def training_time(record: dict) -> float:
     return record["seconds"] + (training_time(before) if before else 0.0)
 
 
-def median_time(work: Callable[[], object], repeats: int) -> float:
-    """Median time of several runs, after one to warm up [s]."""
-    work()
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - began)
-    return float(np.median(times))
-
-
 def train_peers(platform: Platform, folder: Path, budget: str, *, seed: int = 0,
                 threads: int | None = None) -> list[str]:  # fmt: skip
     """Train every network for the same processor time by the default recipe; return the folders.
@@ -150,103 +147,3 @@ def train_peers(platform: Platform, folder: Path, budget: str, *, seed: int = 0,
             train(platform, config, run, resume=(run / CONFIG).exists())
         out.append(str(run))
     return out
-
-
-# ---- speed of DisGNet ---------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Times of one batch: its first guesses, and a training step from samples to SOAP [s]."""
-
-    run: float
-    train: float
-
-
-@dataclass(frozen=True)
-class Speed:
-    """Times of DisGNet on this machine: `gough evaluate --speed`.
-
-    Attributes:
-        batch: samples in a batch.
-        threads: PyTorch's threads.
-        forms: times of the evaluations "dense", "structured" and "tables"; tables are for training
-            only.
-        guesses: by shipped network, time of 1,000 first guesses by onnxruntime [s].
-        stages: the same with Newton's method.
-    """
-
-    batch: int
-    threads: int
-    forms: dict[str, Timing]
-    guesses: dict[str, float]
-    stages: dict[str, float]
-
-    def lines(self) -> list[str]:
-        """The figures as text, at most 80 columns wide."""
-        out = [f"DisGNet, {self.batch} samples, PyTorch with {self.threads} threads"]
-        out.append("form          run ms   train ms   times dense    epoch of 400,000")
-        dense = self.forms["dense"]
-        for name, t in self.forms.items():
-            times = f"{dense.run / t.run:.1f}, {dense.train / t.train:.1f}"
-            epoch = f"{t.train * EPOCH / self.batch:.1f} s"
-            out.append(
-                f"{name:<10} {1e3 * t.run:9.2f} {1e3 * t.train:10.2f} {times:>13} {epoch:>19}"
-            )
-        for name, guess in self.guesses.items():
-            both = f"{1e3 * guess:.2f} ms, with Newton {1e3 * self.stages[name]:.2f} ms"
-            out.append(f"1,000 poses, {name}: guess {both}")
-        return out
-
-
-def measure_speed(platform: Platform, batch: int = 1000, repeats: int = 5) -> Speed:
-    """Time DisGNet's forms and the shipped networks: medians of `repeats`, after one to warm up.
-
-    The weights of the timed forms are random.
-    """
-    import torch
-
-    options: dict[str, dict] = {
-        "dense": {"form": "dense"},
-        "structured": {"table": 0},
-        "tables": {},
-    }
-    forms = {name: _time(platform, batch, repeats, given) for name, given in options.items()}
-    legs = dataset(platform, DatasetSpec(1000, 1))[1]
-    guesses, stages = {}, {}
-    for name in shipped_names(platform):
-        seed = NetworkSeed.shipped(platform, name)
-        guesses[name] = median_time(lambda seed=seed: seed.guess(legs), repeats)
-        stages[name] = median_time(lambda seed=seed: solve(platform, legs, seed=seed), repeats)
-    return Speed(batch, torch.get_num_threads(), forms, guesses, stages)
-
-
-def _time(platform: Platform, batch: int, repeats: int, options: dict) -> Timing:
-    import torch
-
-    from gough.learn.loss import default_beta, training_loss
-    from gough.learn.models import Scaling, build
-    from gough.learn.optim import SOAP
-    from gough.learn.sampling import Stream
-
-    torch.manual_seed(0)
-    model = build("disgnet", platform, Scaling.of(platform), **options)
-    stream = Stream(platform)
-    optimiser = SOAP(model.parameters(), lr=1e-3)
-    beta = default_beta(platform)
-    legs = stream.batch(batch, 0).legs
-
-    @torch.no_grad()
-    def run() -> None:
-        model(legs)
-
-    def step() -> None:
-        samples = stream.batch(batch, 0)
-        optimiser.zero_grad()
-        training_loss(model, samples.legs, samples, beta).backward()
-        optimiser.step()
-
-    model.eval()
-    guessing = median_time(run, repeats)
-    model.train()
-    return Timing(guessing, median_time(step, repeats))

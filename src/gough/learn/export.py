@@ -54,9 +54,10 @@ def network_facts(model: PoseNetwork, config: TrainConfig, record: dict) -> dict
 def to_onnx(model: PoseNetwork, facts: dict) -> bytes:
     """Convert to a sealed ONNX file: legs (N, 6) float64 to raw numbers (N, outputs) float64."""
     legs = torch.as_tensor(model.scaling.leg_mean).expand(2, 6).contiguous()
+    given = _Raw(model.for_export()).eval()
     with quiet():
         program = torch.onnx.export(
-            _Raw(model).eval(), (legs,), dynamo=True, external_data=False, opset_version=18,
+            given, (legs,), dynamo=True, external_data=False, opset_version=18,
             input_names=["legs"], output_names=["raw"],
             dynamic_shapes=({0: torch.export.Dim("rows", min=1)},), verbose=False,
         )  # fmt: skip
@@ -82,7 +83,7 @@ def _strip(proto: onnx.ModelProto) -> None:
 
 
 class _Raw(nn.Module):
-    def __init__(self, model: PoseNetwork) -> None:
+    def __init__(self, model) -> None:
         super().__init__()
         self.model = model
 

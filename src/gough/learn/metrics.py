@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -169,3 +171,14 @@ def plain_newton(platform: Platform, guess: Pose, legs: Array) -> tuple[Pose, ND
         R[active] = rotation_exp(step[:, 3:]) @ R[active]
     t[~converged], R[~converged] = torch.nan, torch.nan
     return Pose.from_rotation(t.numpy(), R.numpy()), converged.numpy()
+
+
+def median_time(work: Callable[[], object], repeats: int) -> float:
+    """Median time of several runs, after one to warm up [s]."""
+    work()
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - began)
+    return float(np.median(times))

@@ -15,8 +15,8 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.learn.evaluate import Row, evaluate, median_time
-from gough.learn.metrics import THRESHOLDS, measure
+from gough.learn.evaluate import Row, evaluate
+from gough.learn.metrics import THRESHOLDS, measure, median_time
 from gough.paper.methods import Method, Success, batched, ours, scipy, sequential
 from gough.paper.published import GAMMAS
 from gough.paper.study import Study, with_workspace_of

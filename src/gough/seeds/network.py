@@ -202,7 +202,11 @@ def read_facts(content: bytes, where: str) -> dict:
 
 
 def _facts(body: bytes, where: str) -> dict:
-    """The JSON text of the metadata entry "gough", without parsing the graph."""
+    """The JSON text of the metadata entry "gough", without parsing the graph.
+
+    onnxruntime's `get_modelmeta` gives it as well, but only from a session, which optimises the
+    whole graph first; the names of all networks that come with the package are read at each solve.
+    """
     at = body.rfind(b"\x0a\x05gough\x12")
     try:
         size, start = _varint(body, at + 8)
@@ -212,6 +216,9 @@ def _facts(body: bytes, where: str) -> dict:
     facts = facts if at >= 0 and isinstance(facts, dict) else {}
     if facts.get("format") != FORMAT or not facts.keys() >= KEYS:
         raise GoughError(f"{where}: {OTHER_FORMAT}")
+    recipe = facts.get("config", {}).get("optimiser", {})
+    if facts["kind"] == "disgnet" and "refresh" not in recipe:
+        facts["kind"] = "disgnet-linear"  # which was called so before the nonlinear reading
     return facts
 
 
@@ -293,6 +300,15 @@ def find_network(platform: Platform, name: str | Path) -> NetworkSeed | Universa
 def shipped_names(platform: Platform) -> list[str]:
     """Networks that come with the package for a platform, as it is now."""
     return sorted(facts["kind"] for _, facts in _shipped(platform))
+
+
+def shipped_weights(platform: Platform, name: str) -> Path | None:
+    """The file for the weights of a network that comes with the package, None for other names."""
+    for file, facts in _shipped(platform):
+        if facts["kind"] == name:
+            folder = Path(str(resources.files("gough").joinpath("weights")))
+            return (folder / file).with_suffix(".safetensors")
+    return None
 
 
 def _shipped(platform: Platform) -> list[tuple[str, dict]]:

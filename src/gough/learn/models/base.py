@@ -144,8 +144,15 @@ class PoseNetwork(nn.Module):
 
     def raw(self, legs: Tensor) -> Tensor:
         """Raw numbers (N, outputs), float64, for readings (N, 6), float64."""
-        x = (legs - self.leg_mean) / self.leg_std
-        return self.network(x.to(self.dtype)).double()
+        return self.network(self.normalised(legs)).double()
+
+    def normalised(self, legs: Tensor) -> Tensor:
+        """Readings (N, 6), float64, with mean 0 and deviation 1 over the workspace, in `dtype`."""
+        return ((legs - self.leg_mean) / self.leg_std).to(self.dtype)
+
+    def for_export(self) -> nn.Module:
+        """The module whose `raw` a network's file evaluates."""
+        return self
 
     def forward(self, legs: Tensor) -> tuple[Tensor, Tensor]:
         """Translation (N, 3) [platform unit] and rotation (N, 3, 3) from home, for readings (N, 6).

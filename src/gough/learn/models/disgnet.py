@@ -29,6 +29,7 @@ two_legs` computes both). The network has three evaluations of the same weights:
 
 from __future__ import annotations
 
+import copy
 from typing import Literal
 
 import torch
@@ -50,6 +51,7 @@ from gough.learn.models.two_legs import LEG_PAIRS, Product, of_pairs
 from gough.platform import Platform
 
 WIDTH = 1.6  # deviation of the Gaussians of legs, relative to half the legs' range
+FILE_NODES = 12  # nodes of each leg of the series that a network's file holds
 NORM_NODES = 16  # nodes of each leg that the norm is computed from
 SMALLEST = 1e-3  # numbers that vary less, relative to their mean size, are not magnified to 1
 
@@ -120,8 +122,8 @@ class DisGNet(GraphNetwork):
             return self.dense(self.matrix(self.edges(x)), order)
         if self.training and self.table:
             shift = float(x[0, 0].detach().double() * 1000 % 1)  # other nodes in each batch
-            return self._finish(self.tabulated(x, shift))
-        return self._finish(self.structured(self.edges(x)))
+            return self.finish(self.tabulated(x, shift))
+        return self.finish(self.structured(self.edges(x)))
 
     # ---- the statement ----------------------------------------------------------------
 
@@ -138,10 +140,10 @@ class DisGNet(GraphNetwork):
         product = torch.einsum("nujh,njvh->nuvh", self.left(h), self.right(h))
         gain, bias = (b[order][:, order].to(h.dtype) for b in (self.gain, self.bias))
         m = self.own_of(h) * product * gain + bias
-        mean, scale = self._norm(matrix)
+        mean, scale = self.norm_of(matrix)
         m = (m - mean) * scale
         updated = m + self.second(nn.functional.silu(self.first(m)))
-        return self._finish(updated.sum((1, 2)) / NODES)
+        return self.finish(updated.sum((1, 2)) / NODES)
 
     def nodes(self) -> Tensor:
         """f1(emb d_u) * f2(emb d_v), (12, 12, H)."""
@@ -167,18 +169,19 @@ class DisGNet(GraphNetwork):
         out[base, top] = out[top, base] = True
         return out
 
-    def _finish(self, pooled: Tensor) -> Tensor:
+    def finish(self, pooled: Tensor) -> Tensor:
+        """Raw numbers (N, 12) for z (N, H)."""
         return self.last(self.head(self.readout(pooled)))
 
     # ---- by pairs of legs -------------------------------------------------------------
 
     def structured(self, edges: Tensor) -> Tensor:
         """z (N, H) for scaled lengths (N, 6) of the legs' edges."""
-        m = Product(self, edges, *self._norm(edges)).all()
+        m = Product(self, edges, *self.norm_of(edges)).all()
         hidden = nn.functional.silu(self.first(m)).sum(1)
         return (m.sum(1) + self.second(hidden)) / NODES
 
-    def _norm(self, like: Tensor) -> tuple[Tensor, Tensor]:
+    def norm_of(self, like: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and 1 / deviation (H,) of m over all pairs (u, v) and the legs' range."""
         product, to_series = self._at_nodes(NORM_NODES, 0.5, like)
         return product.norm(to_series)
@@ -223,6 +226,9 @@ class DisGNet(GraphNetwork):
         linear, hidden = (phi.flatten(1) @ single).chunk(2, dim=-1)
         return (linear + self.second(hidden + products.flatten(1) @ pairs)) / NODES
 
+    def for_export(self) -> nn.Module:
+        return SeriesNetwork(self, FILE_NODES)
+
     def _start_norm(self, x: Tensor) -> None:
         """Choose constants so that random readings give every number deviation 1."""
         m = Product(self, self.edges(x)).all().unflatten(1, (NODES, NODES))
@@ -240,3 +246,30 @@ def sum_of_silu(first: Tensor, second: Tensor) -> Tensor:
     for a, b in zip(first.unbind(1), second.unbind(1), strict=True):
         total = total + nn.functional.silu(a[:, None] + b)
     return total
+
+
+class SeriesNetwork(nn.Module):
+    """A trained DisGNet as the series of its 21 functions and its head: what its file evaluates.
+
+    Args:
+        net: the network.
+        count: K; the series are computed in float64.
+    """
+
+    single: Tensor
+    pairs: Tensor
+
+    def __init__(self, net: DisGNet, count: int) -> None:
+        super().__init__()
+        self.net = net
+        exact = copy.deepcopy(net)
+        exact.cast(torch.float64)
+        with torch.no_grad():
+            single, pairs = exact.series(count, 0.5, exact.range_middle)
+        self.register_buffer("single", single.to(net.dtype))
+        self.register_buffer("pairs", pairs.to(net.dtype))
+
+    def raw(self, legs: Tensor) -> Tensor:
+        """Raw numbers (N, 12), float64, for readings (N, 6), float64."""
+        z = self.net.of_series(self.net.normalised(legs), self.single, self.pairs)
+        return self.net.finish(z).double()
