@@ -31,11 +31,11 @@ SIDES = ("left", "right")
 
 def make_optimiser(config: OptimiserConfig, model: nn.Module) -> Optimizer:
     """Create the optimiser that a configuration names."""
-    options = {"lr": config.lr, "weight_decay": config.weight_decay}
+    parameters, lr, decay = model.parameters(), config.lr, config.weight_decay
     if config.kind == "soap":
-        return SOAP(model.parameters(), refresh=config.refresh, **options)
+        return SOAP(parameters, lr=lr, weight_decay=decay, refresh=config.refresh)
     kind = {"adam": torch.optim.Adam, "adamw": torch.optim.AdamW}[config.kind]
-    return kind(model.parameters(), **options)
+    return kind(parameters, lr=lr, weight_decay=decay)
 
 
 class SOAP(Optimizer):
