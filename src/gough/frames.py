@@ -108,14 +108,11 @@ class FramePose:
 
     def of(self, pose: Pose) -> Pose:
         """Poses (...) of the frame, from those of the platform."""
-        shift = self.pivot - pose.rotation @ self.pivot
-        return self.before @ Pose.trusted(pose.position + shift, pose.wxyz) @ self.after
+        return self.before @ about_origin(pose, self.pivot) @ self.after
 
     def platform_pose(self, pose: Pose) -> Pose:
         """Poses (...) of the platform, from those of the frame: inverse of `of`."""
-        found = self.before.inverse() @ pose @ self.after.inverse()
-        shift = self.pivot - found.rotation @ self.pivot
-        return Pose.trusted(found.position - shift, found.wxyz)
+        return about_origin(self.before.inverse() @ pose @ self.after.inverse(), -self.pivot)
 
     def twist_matrix(self, pose: Pose) -> Array:
         """Matrices (..., 6, 6) from twists of the platform's poses to twists of the frame's.
@@ -133,6 +130,14 @@ class FramePose:
         out[..., :3, :3] = out[..., 3:, 3:] = rotation
         out[..., :3, 3:] = rotation @ -np.cross(lever[..., None, :], np.eye(3)).swapaxes(-1, -2)
         return out
+
+
+def about_origin(pose: Pose, pivot: Array) -> Pose:
+    """Poses (...) of the same motions as about `pivot` (3,), written about the origin: t + c - R c.
+
+    With -pivot it is the inverse.
+    """
+    return Pose.trusted(pose.position + pivot - pose.rotation @ pivot, pose.wxyz)
 
 
 def frame_pose(frames: Frames, pivot: Array, name: str) -> FramePose:

@@ -27,6 +27,7 @@ import numpy as np
 from gough import quaternion
 from gough.calibration.arrays import Array
 from gough.calibration.parameters import ARM, BASE, MOVING, OFFSET, ROD, TILT, Parameters
+from gough.frames import about_origin
 from gough.pose import Pose
 
 
@@ -50,8 +51,8 @@ class Rigid:
     @classmethod
     def of(cls, pose: Pose, pivot: Array | float = 0.0) -> Rigid:
         """The motion that a pose stands for, given the point it rotates about."""
-        R = pose.rotation
-        return cls(R, pose.position + pivot - R @ (np.zeros(3) + pivot))
+        whole = about_origin(pose, np.zeros(3) + pivot)
+        return cls(whole.rotation, whole.position)
 
     def pose(self) -> Pose:
         """Return a pose without pivot."""
