@@ -16,6 +16,13 @@ def reference() -> Platform:
     return Platform.load("reference")
 
 
+def gradients(model: Any, value: torch.Tensor) -> dict[str, torch.Tensor]:
+    """Derivatives of a number by the parameters that it depends on."""
+    model.zero_grad()
+    value.backward()
+    return {n: p.grad.clone() for n, p in model.named_parameters() if p.grad is not None}
+
+
 def network(kind: str, platform: Platform, seed: int = 0, **options) -> Any:
     """Of random weights, in float64, all of them different from their special starts."""
     torch.manual_seed(seed)

@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from learn.networks import network, reference
+from learn.networks import gradients, network, reference
 from machines import random_platform
 
 from gough import leg_lengths
@@ -16,12 +16,6 @@ from gough.learn.models.two_legs import Product
 
 def small(platform, seed=0, **options):
     return network("disgnet", platform, seed, width=12, initial=1, bumps=8, **options)
-
-
-def gradients(model, value):
-    model.zero_grad()
-    value.backward()
-    return {n: p.grad.clone() for n, p in model.named_parameters() if p.grad is not None}
 
 
 @settings(max_examples=5)

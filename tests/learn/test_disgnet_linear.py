@@ -3,16 +3,10 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from learn.networks import network, reference
+from learn.networks import gradients, network, reference
 from machines import random_platform
 
 from gough import leg_lengths
-
-
-def gradients(model, value):
-    model.zero_grad()
-    value.backward()
-    return {n: p.grad.clone() for n, p in model.named_parameters() if p.grad is not None}
 
 
 @settings(max_examples=10)
