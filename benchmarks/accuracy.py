@@ -1,4 +1,4 @@
-"""How often the solver is right: every catalog machine, and wide workspaces. Fixed seeds.
+"""Shares of right answers of the solver: every catalog machine, and wide workspaces. Fixed seeds.
 
 python benchmarks/accuracy.py           # about a minute
 """

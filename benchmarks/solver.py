@@ -1,4 +1,4 @@
-"""How fast the solver is, next to what people use instead: one run, one table.
+"""Speed of the solver beside that of NumPy and SciPy, in one run.
 
     python benchmarks/solver.py             # about two minutes
     python benchmarks/solver.py --memory    # also a file of 20 million rows (3 GB of disk)

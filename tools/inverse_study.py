@@ -1,4 +1,4 @@
-"""How many iterations the DisGNet paper's inverse takes, and what its stopping rule does.
+"""Iterations of the DisGNet paper's inverse, and the effect of its stopping rule.
 
     python tools/inverse_study.py                                   the tables of docs/gpu_newton.md
     python tools/inverse_study.py docs/images/inverse_iterations.svg      its figure

@@ -1,4 +1,4 @@
-"""Time spent on compiling in this process, and who is told when it begins.
+"""Measure the time that this process compiles, and call a function when compiling begins.
 
 Numba reports to `gough.kernel.jit`, which reports here; nothing is imported.
 """

@@ -1,4 +1,4 @@
-"""What is tried: each target makes one input from dice, gives it to gough and judges the answer."""
+"""Targets of the fuzzer: each makes a random input, passes it to gough and checks the result."""
 
 from __future__ import annotations
 

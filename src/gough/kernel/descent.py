@@ -31,7 +31,7 @@ FLAT = 1e-3
 
 @inner
 def descend(constants, buffer, work, tolerance, limit):
-    """From the pose in `buffer` (stride 1) downhill, in place.
+    """Move the pose in `buffer` (stride 1) downhill, in place.
 
     Args:
         work: (4, 6, 6); afterwards work[0] is J and work[3, 0] is r at the pose.

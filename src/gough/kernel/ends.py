@@ -1,4 +1,4 @@
-"""From the ends of paths to real poses: find the ends that are real, refine them to rounding.
+"""Real poses among the ends of paths: find the ends that are real, refine them to rounding.
 
 The solutions for real readings are closed under conjugation, so an end is either real or one
 of a pair; both stand far apart in practice (below 1e-10 against above 1e-2). An end that is

@@ -1,4 +1,4 @@
-"""How far each axis of a pose can still move before a limit, compiled."""
+"""Compiled search for the distance that each axis of a pose can move until a limit ends it."""
 
 from __future__ import annotations
 
