@@ -17,7 +17,7 @@ import gough
 from gough import GoughError, Platform
 from gough.export.c import c_files
 from gough.export.folder import write_folder
-from gough.export.template import as_prefix
+from gough.export.template import as_prefix, comment_text
 
 # all kinds of leg, both kinds of number
 KINDS = {"reference": "double", "rubin_camera": "float", "reachy_mini": "double"}
@@ -151,11 +151,16 @@ def test_a_prefix_that_is_no_name_is_an_error(prefix: str, said: str) -> None:
         c_files(Platform.load("reference"), prefix)
 
 
+def test_a_name_in_a_comment_is_one_line_of_plain_characters() -> None:
+    hostile = 'a */\n#error "\\ ??/ @x@\x00'
+    assert comment_text(hostile) == "a _/_#error __ __/ _x__"
+
+
 @pytest.mark.process
 def test_hostile_names_stay_in_their_comments(tmp_path: Path) -> None:
     need("gcc")
-    name = 'a */ int x; "\n#error \\ ??/ @digest@'
-    platform = replace(machines.random_platform(3), name=name, unit='*/"\n')
+    name = 'a */ int x; " #error \\ ??/ @digest@'
+    platform = replace(machines.random_platform(3), name=name, unit='*/"')
     write(platform, tmp_path)
     run(["gcc", *WARNINGS, "-c", tmp_path / "machine.c", "-o", "/dev/null"])
     program = tmp_path / "test"
