@@ -10,8 +10,6 @@ from gough.commands.given import Legs, readings_given
 from gough.commands.options import Json, PlatformName, option
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     from gough.modes.assembly import AssemblyModes
     from gough.modes.choose import Choice
 
@@ -155,22 +153,9 @@ def _summary(modes: AssemblyModes, choice: Choice, k: int) -> str:
 def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
     """One row for each pose, the best of its set of readings first."""
     from gough.files import write_table
+    from gough.files.modes import mode_table
 
-    write_table(path, _columns(modes, choice), modes.platform)
-
-
-def _columns(modes: AssemblyModes, choice: Choice) -> dict[str, pa.Array]:
-    """Columns of all poses; sets of readings and poses of a set are numbered from 1."""
-    import numpy as np
-
-    from gough.modes.result import mode_columns
-    from gough.tables import number_column
-
-    numbers = {"row": number_column(modes.row + 1), "pose": number_column(choice.rank + 1)}
-    columns = numbers | {n: c for n, c in mode_columns(modes, None).items() if n != "row"}
-    columns |= {f"passes_{name}": number_column(passed) for name, passed in choice.passes.items()}
-    order = number_column(np.lexsort((choice.rank, modes.row)))
-    return {name: column.take(order) for name, column in columns.items()}
+    write_table(path, mode_table(modes, choice), modes.platform)
 
 
 def _facts(modes: AssemblyModes, choice: Choice) -> dict:
@@ -178,9 +163,10 @@ def _facts(modes: AssemblyModes, choice: Choice) -> dict:
     import numpy as np
     import pyarrow as pa
 
+    from gough.files.modes import mode_table
     from gough.status import ModesStatus
 
-    rows = pa.table(_columns(modes, choice)).to_pylist()
+    rows = pa.table(mode_table(modes, choice)).to_pylist()
     legs, complete = modes.legs.reshape(-1, 6), np.ravel(modes.complete)
     sets = [
         {

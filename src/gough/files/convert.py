@@ -27,6 +27,8 @@ from gough.files.formats import (
     STANDARD,
     Given,
     GivenRow,
+    Out,
+    Target,
     file_format,
     open_sink,
     open_source,
@@ -37,6 +39,7 @@ from gough.files.metadata import describe
 from gough.files.plausible import cause, check_plausible
 from gough.files.report import Report
 from gough.files.rows import Block, Reading, Sink, Source
+from gough.files.stores import STORE
 from gough.fk.solution import solution_columns
 from gough.home_mode import pose_status
 from gough.kinematics import leg_lengths
@@ -53,7 +56,7 @@ Progress = Callable[[Source, Report], None]
 
 def solve_file(
     legs: Given,
-    out: str | Path | None,
+    out: Out | None,
     platform: Platform,
     *,
     reading: Reading = Reading(),
@@ -103,7 +106,7 @@ def solve_file(
     report = Report(tuple(Status), head, frame or "")
     limits = platform.limits is not None if limits is None else limits
     written = solution_names(angles, leg_noise is not None, certify, follow is not None, limits)
-    with _open_job(legs, out, platform, reading, file_leg_columns, written, frame) as job:
+    with open_job(legs, out, platform, reading, file_leg_columns, written, frame) as job:
         solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
         tracker = None if follow is None else _tracker(platform, settings, follow)
         report.time = "" if tracker else time_column(job.source.columns, reading.log)
@@ -125,7 +128,7 @@ def solve_file(
                 report.add_limits(solution.limits, solution.status)
             report.add(solution.pose, readings, solution.status, solution.residual, solution.event)
             invalid = solution.status == Status.INVALID_INPUT
-            report.describe_invalid(block, invalid, lambda i, legs=readings: _leg_fault(legs[i]))
+            report.describe_invalid(block, invalid, lambda i, legs=readings: leg_fault(legs[i]))
             lost = solution.status == Status.UNREACHABLE
             report.describe_unlikely(block, lost, lambda i, legs=readings: cause(platform, legs[i]))
             job.write(block, solution_columns(solution, angles))
@@ -145,7 +148,7 @@ def _tracker(platform: Platform, settings: dict, follow: Mapping[str, float]) ->
 
 def inverse_file(
     poses: Given,
-    out: str | Path | None,
+    out: Out | None,
     platform: Platform,
     *,
     reading: Reading = Reading(),
@@ -174,7 +177,7 @@ def inverse_file(
     form = reading.log if text else LogFormat()
     factor, offset, _ = form.conversion(platform, [""] * 6)
     written = (*form.names, STATUS)
-    with _open_job(poses, out, platform, reading, pose_columns, written) as job:
+    with open_job(poses, out, platform, reading, pose_columns, written) as job:
         view = source_frame(job.source, platform, frame)
         for block in job.blocks:
             pose, fault = poses_from_columns(block.numbers(job.numbers), job.numbers)
@@ -214,9 +217,9 @@ class _Job:
 
 
 @contextmanager
-def _open_job(
+def open_job(
     path: Given,
-    out: str | Path | None,
+    out: Out | None,
     platform: Platform,
     reading: Reading,
     pick: Callable[[str, Sequence[str]], tuple[str, ...]],
@@ -242,19 +245,21 @@ def _open_job(
         yield _Job(source, blocks, numbers, keep, sink)
 
 
-def _check_paths(path: Given, out: str | Path | None) -> None:
+def _check_paths(path: Given, out: Out | None) -> None:
     """Raise for a name of no known format, and for an output that is the input."""
     file_format(path, read=True)
     if out is None:
         return
     file_format(out)
-    if isinstance(path, GivenRow) or STANDARD in (str(path), str(out)):
+    if isinstance(path, GivenRow) or isinstance(out, Target) or STANDARD in (str(path), str(out)):
         return
-    if Path(path).exists() and Path(out).exists() and Path(path).samefile(out):
+    read, wanted = Path(str(path)), Path(out)
+    same = read.exists() and wanted.exists() and read.samefile(wanted)
+    if same or (STORE.match(str(out)) and str(path) == str(out)):
         raise GoughError(f"{out}: is the input itself, which would be lost; write to another name")
 
 
-def _leg_fault(legs: Array) -> str:
+def leg_fault(legs: Array) -> str:
     """The fault of six readings that cannot be solved."""
     for name, value in zip(LEGS, legs, strict=True):
         if not np.isfinite(value):

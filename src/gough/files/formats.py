@@ -6,7 +6,7 @@ import io
 import logging
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +25,10 @@ from gough.files.metadata import check_same, describe, pose_frame
 from gough.files.parquet import ParquetSink, ParquetSource
 from gough.files.plausible import check_plausible
 from gough.files.rows import Reading, Sink, Source
+from gough.files.stores import Place, written
 from gough.frames import FramePose
 from gough.platform import Platform
-from gough.whole_file import explain, replacing
+from gough.whole_file import explain
 
 STANDARD = "-"  # standard input or output, as CSV
 FORMATS = (".csv", ".parquet")
@@ -58,10 +59,46 @@ class GivenRow:
         return CsvSource(io.BytesIO(text.encode()), self.where, None, reading)
 
 
-Given = str | Path | GivenRow  # what rows are read from
+@dataclass(frozen=True)
+class FilePart:
+    """Consecutive rows of a file: whole row groups of Parquet, or whole lines of text.
+
+    Attributes:
+        place: the file.
+        start, stop: first row group and the one after the last, or bytes; no stop: to the end.
+        before: rows, or lines, of the file before them.
+    """
+
+    place: Place
+    start: int = 0
+    stop: int | None = None
+    before: int = 0
+
+    def __str__(self) -> str:
+        return str(self.place)
 
 
-def file_format(path: Given, *, read: bool = False) -> str:
+@dataclass(frozen=True)
+class Target:
+    """A file to write.
+
+    Attributes:
+        place: the file.
+        metadata: gives text for the file to carry, when all rows are written; Parquet only.
+    """
+
+    place: Place
+    metadata: Callable[[], Mapping[str, str]] = dict
+
+    def __str__(self) -> str:
+        return str(self.place)
+
+
+Given = str | Path | GivenRow | FilePart  # what rows are read from
+Out = str | Path | Target  # what rows are written to
+
+
+def file_format(path: Given | Out, *, read: bool = False) -> str:
     """The format that a name stands for, ".csv" or ".parquet".
 
     Args:
@@ -176,33 +213,29 @@ def _open(path: Given, reading: Reading) -> Source:
     ending = file_format(path, read=True)
     if str(path) == STANDARD:
         return CsvSource(sys.stdin.buffer, "standard input", None, reading)
-    try:
-        file = open(path, "rb")  # noqa: SIM115 - the source closes it
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; name a file in it") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    part = path if isinstance(path, FilePart) else FilePart(Place.of(path))
+    file, where = part.place.open(), str(part.place)
     try:
         if ending == ".parquet":
-            return ParquetSource(file, str(path), reading)
-        if Path(path).suffix.lower() in EXCEL:
+            return ParquetSource(file, where, reading, part.start, part.stop, part.before)
+        if Path(where).suffix.lower() in EXCEL:
             with file:
-                return open_sheet(file, str(path), reading)
-        size = os.fstat(file.fileno()).st_size
-        return CsvSource(file, str(path), size or None, reading)
+                return open_sheet(file, where, reading)
+        size = part.place.info().size if part.place.store else os.fstat(file.fileno()).st_size
+        return CsvSource(file, where, size or None, reading)
     except BaseException:
         file.close()
         raise
 
 
 @contextmanager
-def open_sink(path: str | Path, metadata: Mapping[str, str]) -> Iterator[Sink]:
+def open_sink(path: Out, metadata: Mapping[str, str]) -> Iterator[Sink]:
     """Open a file to append tables to, or standard output for "-".
 
-    The file appears whole when the block ends without an error; see `replacing`.
+    The file appears whole when the block ends without an error; see `written`.
 
     Args:
-        path: .csv or .parquet, or "-".
+        path: .csv or .parquet, here or in a store, or "-".
         metadata: text for the file to carry; Parquet only.
 
     Raises:
@@ -212,17 +245,19 @@ def open_sink(path: str | Path, metadata: Mapping[str, str]) -> Iterator[Sink]:
     if str(path) == STANDARD:
         with _standard_output() as file:
             yield CsvSink(file)
-    elif file_format(path) == ".csv":
-        with replacing(path) as file:
+        return
+    ending = file_format(path)
+    target = path if isinstance(path, Target) else Target(Place.of(path))
+    with written(target.place) as file:
+        if ending == ".csv":
             yield CsvSink(file)
-    else:
-        with replacing(path) as file:
-            sink = ParquetSink(file, metadata)
-            try:
-                yield sink
-                sink.finish()
-            finally:
-                sink.close()
+            return
+        sink = ParquetSink(file, metadata)
+        try:
+            yield sink
+            sink.finish(target.metadata())
+        finally:
+            sink.close()
 
 
 @contextmanager

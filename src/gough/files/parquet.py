@@ -19,15 +19,27 @@ ROW_GROUP = 1 << 18  # rows
 
 
 class ParquetSource:
-    """Rows of a Parquet file.
+    """Rows of a Parquet file, or of some of its row groups.
 
     See `Source`; `total` and `done` count rows.
+
+    Args:
+        start, stop: first row group and the one after the last; no stop: to the end.
+        before: rows of the file before them.
 
     Raises:
         InputError: not a Parquet file, cut off, or without rows.
     """
 
-    def __init__(self, file: BinaryIO, where: str, reading: Reading) -> None:
+    def __init__(
+        self,
+        file: BinaryIO,
+        where: str,
+        reading: Reading,
+        start: int = 0,
+        stop: int | None = None,
+        before: int = 0,
+    ) -> None:
         self.where, self.reading, self.done = where, reading, 0
         self._input = file
         try:
@@ -47,7 +59,10 @@ class ParquetSource:
         self.columns: list[str] = list(self._schema.names)
         self.units, self.conversions = [""] * len(self.columns), {}
         self._stored = {name: name for name in self.columns}  # names in the file
-        self.total: int | None = self._file.metadata.num_rows
+        facts = self._file.metadata
+        self._groups = list(range(facts.num_row_groups))[start:stop]
+        self._before = before
+        self.total: int | None = sum(facts.row_group(i).num_rows for i in self._groups)
         if not self.total:
             raise InputError(f"{where}: holds no rows; expected a row per pose")
 
@@ -58,9 +73,11 @@ class ParquetSource:
             self._check_number(name)
         wanted = list(dict.fromkeys([*keep, *numbers]))
         stored = [self._stored[name] for name in wanted]
-        batches = self._file.iter_batches(batch_size=self.reading.block_rows, columns=stored)
+        batches = self._file.iter_batches(
+            batch_size=self.reading.block_rows, columns=stored, row_groups=self._groups
+        )
         while (batch := self._next(batches)) is not None:
-            first = self.done + 1
+            first = self._before + self.done + 1
             self.done += len(batch)
             table = pa.Table.from_batches([batch]).select(stored).rename_columns(wanted)
             yield Block(
@@ -80,14 +97,19 @@ class ParquetSource:
         try:
             return next(batches, None)
         except (pa.ArrowException, OSError) as error:
+            row = self._before + self.done
             raise InputError(
-                f"{self.where}: damaged after row {self.done}: {_first_line(error)}; write or copy "
-                "the file again"
+                f"{self.where}: damaged after row {row}: {_first_line(error)}; write or copy the "
+                "file again"
             ) from None
 
     def _check_number(self, name: str) -> None:
         kind = self._schema.field(self._stored[name]).type
-        first = self._next(self._file.iter_batches(batch_size=1, columns=[self._stored[name]]))
+        first = self._next(
+            self._file.iter_batches(
+                batch_size=1, columns=[self._stored[name]], row_groups=self._groups
+            )
+        )
         value = first.column(0)[0].as_py() if first is not None and len(first) else None
         check_number(self.where, name, kind, value)
 
@@ -106,10 +128,11 @@ class ParquetSink:
         if sum(t.num_rows for t in self._waiting) >= ROW_GROUP:
             self._flush()
 
-    def finish(self) -> None:
-        """Write the last rows and the footer."""
+    def finish(self, more: Mapping[str, str] = {}) -> None:
+        """Write the last rows and the footer, with `more` metadata."""
         self._flush()
         if self._writer is not None:
+            self._writer.add_key_value_metadata(self._metadata | dict(more))
             self._writer.close()
 
     def close(self) -> None:
@@ -134,9 +157,7 @@ class ParquetSink:
             "use_byte_stream_split": [f.name for f in schema if pa.types.is_floating(f.type)],
             "write_page_checksum": True,  # damage on the way is noticed when the file is read
         }
-        writer = pq.ParquetWriter(self._file, schema.with_metadata(None), **options)
-        writer.add_key_value_metadata(self._metadata)
-        return writer
+        return pq.ParquetWriter(self._file, schema.with_metadata(None), **options)
 
 
 def _not_parquet(file: BinaryIO, error: Exception) -> str:

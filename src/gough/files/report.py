@@ -106,8 +106,7 @@ class Report:
             usable = np.array([outcome.usable for outcome in self.outcomes])[status]
             new = np.array([event.usable for event in Event])[event]
             self.held += int(np.sum(usable & ~new))
-        counts = np.bincount(status, minlength=len(self.outcomes))
-        self.counts += counts
+        counts = self.count(status)
         if residual is not None:
             for number in np.flatnonzero(counts):
                 found = np.fmax.reduce(residual[status == number])
@@ -121,8 +120,14 @@ class Report:
         if event is not None:
             self.event = np.concatenate([self.event, event[part]])
         self.status = np.concatenate([self.status, status[part]])
+
+    def count(self, status: NDArray[np.uint8]) -> NDArray[np.int64]:
+        """Count a block of rows by status alone; return its counts."""
+        counts = np.bincount(status, minlength=len(self.outcomes))
+        self.counts += counts
         self.compiling = compiling.seconds() - self._compiled_before
         self.seconds = time.perf_counter() - compiling.seconds() - self._start
+        return counts
 
     def add_limits(self, limits: Limits, status: NDArray[np.uint8]) -> None:
         """Count the limits that rows of a block break; it comes before `add`."""
