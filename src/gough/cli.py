@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from importlib import import_module
+from types import NoneType, UnionType
+from typing import Any, get_args, get_origin
 
 import gough
 from gough import compiling
@@ -125,6 +127,7 @@ def _parse(program: str, functions: Functions, arguments: list[str]) -> int:
     """Parse the arguments of a command and call its function."""
     import tyro
 
+    _skip_typeguard()
     # flags are --flag alone, without a --no-flag beside it
     config = (tyro.conf.FlagCreatePairsOff,)
     if isinstance(functions, dict):
@@ -132,6 +135,23 @@ def _parse(program: str, functions: Functions, arguments: list[str]) -> int:
             functions, prog=program, args=arguments, config=config
         )
     return tyro.cli(functions, prog=program, args=arguments, config=config)
+
+
+def _skip_typeguard() -> None:
+    """Let tyro check defaults of None and () itself: importing typeguard takes 0.1 s."""
+    with suppress(ImportError, AttributeError):  # another version of tyro does it its own way
+        from tyro import _resolver
+
+        thorough = _resolver.is_instance
+
+        def is_instance(kind: Any, value: Any) -> bool:
+            if get_origin(kind) is UnionType and value is None:
+                return NoneType in get_args(kind)
+            if value == () and get_args(kind)[1:] == (...,):
+                return get_origin(kind) is tuple
+            return thorough(kind, value)
+
+        _resolver.is_instance = is_instance
 
 
 def _print_error(text: str) -> int:

@@ -194,8 +194,11 @@ def arrow_values(column: pa.ChunkedArray | pa.Array) -> Array:
 
     if pa.types.is_dictionary(column.type):
         column = column.cast(column.type.value_type)
-    nan = number_column(np.array([np.nan]))[0]
-    column = column.cast(pa.float64(), safe=False).fill_null(nan)
+    if column.null_count or not (
+        pa.types.is_integer(column.type) or pa.types.is_floating(column.type)
+    ):  # the others are NumPy's to convert: pyarrow.compute takes long to import
+        nan = number_column(np.array([np.nan]))[0]
+        column = column.cast(pa.float64(), safe=False).fill_null(nan)
     chunks = column.chunks if isinstance(column, pa.ChunkedArray) else [column]
     parts = [np.from_dlpack(chunk) for chunk in chunks if len(chunk)]
     return np.concatenate([np.empty(0), *parts], dtype=np.float64)
@@ -215,12 +218,12 @@ def label_column(codes: NDArray, labels: Sequence[str]) -> pa.Array:
     """An Arrow column of text (N,), each `labels[code]`."""
     import pyarrow as pa
 
-    words = [label.encode() for label in labels]
-    ends = np.cumsum([0, *map(len, words)], dtype=np.int32)
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(words))]
-    dictionary = pa.Array.from_buffers(pa.string(), len(words), buffers)
-    rows = number_column(codes.astype(np.int32))
-    return pa.DictionaryArray.from_arrays(rows, dictionary).cast(pa.string())
+    words = np.array([label.encode() for label in labels], object)
+    lengths = np.array([len(word) for word in words], np.int32)
+    ends = np.concatenate([[0], np.cumsum(lengths[codes])]).astype(np.int32)
+    text = b"".join(words[codes].tolist())  # a cast of Arrow's would import pyarrow.compute
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(text)]
+    return pa.Array.from_buffers(pa.string(), len(codes), buffers)
 
 
 # ---- columns to tables ----------------------------------------------------------------

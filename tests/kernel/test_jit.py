@@ -50,6 +50,30 @@ def test_a_changed_source_never_runs_old_code(tmp_path):
     assert _run(tmp_path) == "6.0 0"
 
 
+SECOND = """
+import contextlib, sys
+from gough import cli, compiling
+solve = "solve 152.6 152.6 152.6 152.6 152.6 152.6 -p reachy_mini"
+for command in (solve, "modes -p reference", "warmup"):
+    heavy = {"scipy.linalg", "cffi", "typeguard", "pyarrow.compute"} & set(sys.modules)
+    with contextlib.suppress(SystemExit):
+        cli.main(command.split())
+print(compiling.seconds(), *heavy)
+"""
+
+
+@pytest.mark.process
+@pytest.mark.slow
+def test_a_second_process_compiles_nothing_and_loads_little():
+    """All compiled functions run from disk, though Numba has not imported what compiling needs."""
+    command = [sys.executable, "-c", SECOND]
+    outputs = [
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)
+    ]
+    assert "limits: there already" in outputs[1]
+    assert outputs[1].splitlines()[-1] == "0.0"
+
+
 def test_what_compiled_code_depends_on(monkeypatch, tmp_path):
     """The function's folder, the kernel's, the statuses and the steps of `home_mode`, no more."""
     kernel = Path(jit_module.__file__).parent

@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import event
+from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 
 from gough import compiling, home_mode, status
 
@@ -49,6 +51,7 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
             return numba.njit(**settings, **options)(function)  # pyright: ignore
         if cache:
             _kept.append(compiled)
+            compiled._cache.__class__ = _Cache  # pyright: ignore
             _expire_with_sources(compiled, Path(inspect.getfile(function)).parent)
         return compiled  # pyright: ignore[reportReturnType]
 
@@ -80,6 +83,20 @@ def inline(function: Callable) -> Any:
 def cache_folders() -> tuple[list[str], list[str]]:
     """Return the folders in which compiled code is kept, and functions whose code cannot be."""
     return sorted({function.stats.cache_path for function in _kept}), _lost
+
+
+class _Cache(FunctionCache):
+    """Numba's cache of compiled code, loaded without what only compiling needs.
+
+    Numba's own `load_overload` first imports all that it can compile, SciPy's linear algebra and
+    cffi among it, which takes longer than all else that a short command does. The compiler does
+    the same again where something must be compiled after all.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 class _Compiling(event.Listener):
