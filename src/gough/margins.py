@@ -141,19 +141,19 @@ def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None
     """
     poses = as_pose(pose)
     constants = limit_constants(platform)
-    position, wxyz = flat_rows(poses)
-    out = new_rows(len(position))
-    in_parts(
-        lambda first, last: margin_rows(constants, position, wxyz, first, last, new_work(), out),
-        len(position), workers,
-    )  # fmt: skip
     kinds = np.flatnonzero(constants[STATED : STATED + KINDS])
+    position, wxyz = flat_rows(poses)
+    out = new_rows(len(position), len(kinds))
+
+    def part_rows(first: int, last: int) -> int:
+        return margin_rows(constants, kinds, position, wxyz, first, last, new_work(), out)
+
+    in_parts(part_rows, len(position), workers)
     margin, share, part, broken = out
-    shape = (*poses.batch, KINDS)
-    names = tuple(NAMES[kind] for kind in kinds)
+    shape = (*poses.batch, len(kinds))
     return Limits(
-        names, margin.reshape(shape)[..., kinds], share.reshape(shape)[..., kinds],
-        part.reshape(shape)[..., kinds], broken.reshape(poses.batch),
+        tuple(NAMES[kind] for kind in kinds), margin.reshape(shape), share.reshape(shape),
+        part.reshape(shape), broken.reshape(poses.batch),
     )  # fmt: skip
 
 
@@ -240,10 +240,10 @@ def flat_rows(pose: Pose) -> tuple[Array, Array]:
     )
 
 
-def new_rows(count: int) -> tuple[Array, Array, NDArray[np.uint8], NDArray[np.uint8]]:
+def new_rows(count: int, kinds: int) -> tuple[Array, Array, NDArray[np.uint8], NDArray[np.uint8]]:
     """Arrays for the results of `margin_rows`."""
-    margin, share = np.empty((count, KINDS)), np.empty((count, KINDS))
-    return margin, share, np.empty((count, KINDS), np.uint8), np.empty(count, np.uint8)
+    margin, share = np.empty((count, kinds)), np.empty((count, kinds))
+    return margin, share, np.empty((count, kinds), np.uint8), np.empty(count, np.uint8)
 
 
 def new_work() -> tuple[Array, ...]:

@@ -10,7 +10,7 @@ broken: 1 << leg, or those of workspace and singularity.
 
 from __future__ import annotations
 
-from math import acos, atan2, cos, floor, inf, nan, pi, sin, sqrt
+from math import atan2, floor, inf, nan, pi, sqrt
 
 import numpy as np
 
@@ -70,21 +70,30 @@ from gough.kernel.linear import pivoted_solve
 
 # Slots of w: results by kind, then for every leg LEG numbers
 MARGIN, SHARE, PART, LEGS = 0, 8, 16, 24
-TIP, ROD, LEVER, SOCKET, LENGTH, ANGLE, PER_SQUARE = 0, 3, 6, 9, 18, 19, 20
-LEG = 21
-SLOTS = LEGS + 6 * LEG
+LEVER, SOCKET, PER_LENGTH, COSINE, SINE = 0, 3, 12, 13, 14
+LEG = 15
+# Rods, or legs, and arms are bodies of 7 numbers: lower end, vector to the upper end, 1 / its
+# square. Number k of leg i is at k * WIDE + i, that of legs 1 to 4 at k * WIDE + 6 + i as well: so
+# legs i and i + 1, 2 or 3 are in neighbouring slots for all i, and the loop over i is vector code.
+WIDE = 12
+WAY, PER_SQUARE, BODY = 3 * WIDE, 6 * WIDE, 7 * WIDE
+ROD = LEGS + 6 * LEG
+ARM_BODY = ROD + BODY
+SQUARE = ARM_BODY + BODY  # squared distance of legs i and i + apart at 8 (apart - 1) + i
+SLOTS = SQUARE + 24
 WORKSPACE_BIT, SINGULARITY_BIT = 6, 7
 GOOD_ENOUGH = 1e-11  # residual of the forces / largest, above which elimination pivots
 
 
 @jit()
-def margin_rows(c, position, wxyz, first, last, work, out):
+def margin_rows(c, kinds, position, wxyz, first, last, work, out):
     """Fill the margins of poses first..last.
 
     Args:
+        kinds: (K,) the kinds of limits that are wanted.
         position, wxyz: (N, 3) and (N, 4).
         work: (SLOTS,), and (6, 6), (6, 6), (6,), (6,) for the forces.
-        out: margin (N, KINDS), share (N, KINDS), part (N, KINDS), broken (N,).
+        out: margin (N, K), share (N, K), part (N, K), broken (N,).
     """
     margin, share, part, broken = out
     w = work[0]
@@ -93,10 +102,10 @@ def margin_rows(c, position, wxyz, first, last, work, out):
             c, position[row, 0], position[row, 1], position[row, 2],
             wxyz[row, 0], wxyz[row, 1], wxyz[row, 2], wxyz[row, 3], w, work,
         )  # fmt: skip
-        for kind in range(KINDS):
-            margin[row, kind] = w[MARGIN + kind]
-            share[row, kind] = w[SHARE + kind]
-            part[row, kind] = np.uint8(w[PART + kind])
+        for k in range(len(kinds)):
+            margin[row, k] = w[MARGIN + kinds[k]]
+            share[row, k] = w[SHARE + kinds[k]]
+            part[row, k] = np.uint8(w[PART + kinds[k]])
     return 0
 
 
@@ -153,7 +162,7 @@ def _note(c, w, kind, index, value, per_scale, bits):
 
 @inner
 def _place_legs(c, R, x, y, z, w):
-    """Store the ends, lever, length and so on of each leg; return bits of those out of reach.
+    """Store the bodies, lever and so on of each leg; return bits of those out of reach.
 
     Repeats `gough.limit_geometry.leg_bodies`. Notes the margins of motor arms: by how much the rod
     is longer than the least and shorter than the greatest distance of the platform joint from
@@ -168,51 +177,56 @@ def _place_legs(c, R, x, y, z, w):
         dy = lever[1] + c[PIVOT + 1] + y - c[BASE + j + 1]
         dz = lever[2] + c[PIVOT + 2] + z - c[BASE + j + 2]
         for k in range(3):
-            w[at + TIP + k] = c[BASE + j + k]
+            w[ROD + k * WIDE + i] = c[BASE + j + k]
         if c[ROTARY] == 1:
-            angle = _motor_angle(c, i, dx, dy, dz, w)
-            if not abs(angle) < inf:
+            if not _swing(c, i, dx, dy, dz, w):
                 unreached |= 1 << i
                 continue
-            _swing(c, i, angle, w)
-            arm, s = c[ARM_LENGTH + i], at + SOCKET
-            dx, dy, dz = dx - arm * w[s], dy - arm * w[s + 1], dz - arm * w[s + 2]
-        w[at + ROD], w[at + ROD + 1], w[at + ROD + 2] = dx, dy, dz
-        square = dx * dx + dy * dy + dz * dz
-        w[at + LENGTH] = sqrt(square)
-        w[at + PER_SQUARE] = 1 / square
-        if not square > 0:
+            arm = ARM_BODY + WAY + i
+            dx, dy, dz = dx - w[arm], dy - w[arm + WIDE], dz - w[arm + 2 * WIDE]
+        way = ROD + WAY + i
+        w[way], w[way + WIDE], w[way + 2 * WIDE] = dx, dy, dz
+        per_square = 1 / (dx * dx + dy * dy + dz * dz)
+        w[ROD + PER_SQUARE + i] = per_square
+        w[at + PER_LENGTH] = sqrt(per_square)
+        if not per_square < inf:
             unreached |= 1 << i
     return unreached
 
 
 @inline
-def _motor_angle(c, i, dx, dy, dz, w):
-    """Angle of motor i, NaN where it cannot reach; repeats `gough.struts.motor_angles`."""
-    x, y = AXIS_X + 3 * i, AXIS_Y + 3 * i
+def _swing(c, i, dx, dy, dz, w):
+    """Store the directions and body of arm i, and its rod's lower end; False out of reach.
+
+    Repeats `gough.struts.motor_angles` for the angle's cosine and sine: with both of
+    atan2(v, u) known, no angle is needed.
+    """
+    at, j = LEGS + LEG * i, 3 * i
+    x, y = AXIS_X + j, AXIS_Y + j
     u = dx * c[x] + dy * c[x + 1] + dz * c[x + 2]
     v = dx * c[y] + dy * c[y + 1] + dz * c[y + 2]
-    arm, rod = c[ARM_LENGTH + i], c[ROD_LENGTH + i]
-    total, twice = dx * dx + dy * dy + dz * dz + arm * arm, 2 * arm * sqrt(u * u + v * v)
+    arm, rod, flat = c[ARM_LENGTH + i], c[ROD_LENGTH + i], sqrt(u * u + v * v)
+    total, twice = dx * dx + dy * dy + dz * dz + arm * arm, 2 * arm * flat
     nearest, farthest = sqrt(total - twice if total > twice else 0.0), sqrt(total + twice)
     left = min(rod - nearest, farthest - rod)
     _note(c, w, ARM, i, left, 1 / arm, 0)
-    cosine = (total - rod * rod) / twice
-    return atan2(v, u) + c[BRANCH + i] * acos(cosine) if abs(cosine) <= 1 else nan
-
-
-@inline
-def _swing(c, i, angle, w):
-    """Store the angle of motor i, its arm's directions and its tip."""
-    at, j = LEGS + LEG * i, 3 * i
-    along, ahead = cos(angle), sin(angle)
-    w[at + ANGLE] = angle
+    inner_cosine = (total - rod * rod) / twice
+    if not abs(inner_cosine) <= 1:
+        return False
+    inner_sine = c[BRANCH + i] * sqrt((1 - inner_cosine) * (1 + inner_cosine))
+    along = (u * inner_cosine - v * inner_sine) / flat
+    ahead = (v * inner_cosine + u * inner_sine) / flat
+    w[at + COSINE], w[at + SINE] = along, ahead
     for k in range(3):
-        socket = at + SOCKET + k
-        w[socket] = along * c[AXIS_X + j + k] + ahead * c[AXIS_Y + j + k]
-        w[socket + 3] = along * c[AXIS_Y + j + k] - ahead * c[AXIS_X + j + k]
+        socket, body = at + SOCKET + k, ARM_BODY + k * WIDE + i
+        w[socket] = along * c[x + k] + ahead * c[y + k]
+        w[socket + 3] = along * c[y + k] - ahead * c[x + k]
         w[socket + 6] = c[AXIS_Z + j + k]
-        w[at + TIP + k] += c[ARM_LENGTH + i] * w[socket]
+        w[body] = c[BASE + j + k]
+        w[body + WAY] = arm * w[socket]
+        w[ROD + k * WIDE + i] += w[body + WAY]
+    w[ARM_BODY + PER_SQUARE + i] = 1 / (arm * arm)
+    return True
 
 
 @inner
@@ -220,11 +234,12 @@ def _strokes(c, w):
     """Note readings within their stroke; repeats `gough.struts.readings`."""
     broken = 0
     for i in range(6):
+        at = LEGS + LEG * i
         if c[ROTARY] == 1:
-            angle = w[LEGS + LEG * i + ANGLE] - c[ZERO + i]
+            angle = atan2(w[at + SINE], w[at + COSINE]) - c[ZERO + i]
             reading = (angle - 2 * pi * floor(angle / (2 * pi) + 0.5)) * c[PER_GAIN + i]
         else:
-            reading = (w[LEGS + LEG * i + LENGTH] - c[ZERO + i]) * c[PER_GAIN + i]
+            reading = (1 / w[at + PER_LENGTH] - c[ZERO + i]) * c[PER_GAIN + i]
         value = min(reading - c[STROKES + 2 * i], c[STROKES + 2 * i + 1] - reading)
         broken |= _note(c, w, STROKE, i, value, c[PER_STROKE + i], 1 << i)
     return broken
@@ -246,7 +261,7 @@ def _base_cones(c, w):
         return broken
     least, worst, broken = inf, 0, 0
     for i in range(6):
-        cosine = _dot(_base_axis(c, w, i), w, i, 1.0) / w[LEGS + LEG * i + LENGTH]
+        cosine = _dot(_base_axis(c, w, i), w, i, 1.0) * w[LEGS + LEG * i + PER_LENGTH]
         worst, least = (i, cosine) if cosine < least else (worst, least)
         broken |= 1 << i if cosine < c[BASE_COSINE] else 0
     return broken | _note_base(c, w, worst)
@@ -262,7 +277,7 @@ def _moving_cones(c, R, w):
         return broken
     least, worst, broken = inf, 0, 0
     for i in range(6):
-        cosine = _dot(_moving_axis(c, R, i), w, i, -1.0) / w[LEGS + LEG * i + LENGTH]
+        cosine = _dot(_moving_axis(c, R, i), w, i, -1.0) * w[LEGS + LEG * i + PER_LENGTH]
         worst, least = (i, cosine) if cosine < least else (worst, least)
         broken |= 1 << i if cosine < c[MOVING_COSINE] else 0
     return broken | _note_moving(c, R, w, worst)
@@ -304,17 +319,22 @@ def _moving_axis(c, R, i):
 
 
 @inline
+def _rod(w, i):
+    """The rod of leg i, or the leg, a triple."""
+    return w[ROD + WAY + i], w[ROD + WAY + WIDE + i], w[ROD + WAY + 2 * WIDE + i]
+
+
+@inline
 def _dot(a, w, i, sign):
     """Product of a triple and the rod of leg i, or its opposite."""
-    r = LEGS + LEG * i + ROD
-    return sign * (a[0] * w[r] + a[1] * w[r + 1] + a[2] * w[r + 2])
+    x, y, z = _rod(w, i)
+    return sign * (a[0] * x + a[1] * y + a[2] * z)
 
 
 @inline
 def _angle(a, w, i, sign):
     """Angle [rad] between a triple and the rod of leg i, or its opposite."""
-    r = LEGS + LEG * i + ROD
-    x, y, z = w[r], w[r + 1], w[r + 2]
+    x, y, z = _rod(w, i)
     p, q, s = a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x
     return atan2(sqrt(p * p + q * q + s * s), _dot(a, w, i, sign))
 
@@ -325,52 +345,50 @@ def _angle(a, w, i, sign):
 @inner
 def _gaps(c, w):
     """Note the distances between the legs; repeats `gough.limit_geometry.leg_gaps`."""
-    pair, broken = 0, 0
-    for i in range(6):
-        for j in range(i + 1, 6):
+    rotary, broken = c[ROTARY] == 1, 0
+    for number in range(7 * (2 if rotary else 1)):
+        for i in range(4):
+            w[ROD + number * WIDE + 6 + i] = w[ROD + number * WIDE + i]
+    _square_distances(w, rotary, 1)
+    _square_distances(w, rotary, 2)
+    _square_distances(w, rotary, 3)
+    for apart in range(1, 4):
+        for i in range(6 if apart < 3 else 3):
+            j = (i + apart) % 6
+            first, second = min(i, j), max(i, j)
+            pair = first * (11 - first) // 2 + second - first - 1
             if c[PER_GAP + pair] > 0:
-                square = _rod_rod(w, i, j)
-                if c[ROTARY] == 1:
-                    square = min(square, _arm_rod(c, w, i, j), _arm_rod(c, w, j, i))
-                    square = min(square, _arm_arm(c, w, i, j))
-                value = sqrt(square) - c[GAP + pair]
+                value = sqrt(w[SQUARE + 8 * (apart - 1) + i]) - c[GAP + pair]
                 bits = (1 << i) | (1 << j)
                 broken |= _note(c, w, CLEARANCE, pair, value, c[PER_GAP + pair], bits)
-            pair += 1
     return broken
 
 
 @inline
-def _rod_rod(w, i, j):
-    a, b = LEGS + LEG * i, LEGS + LEG * j
-    u, v = a + ROD, b + ROD
-    return _square_distance(
-        w[a] - w[b], w[a + 1] - w[b + 1], w[a + 2] - w[b + 2],
-        w[u], w[u + 1], w[u + 2], w[v], w[v + 1], w[v + 2], w[a + PER_SQUARE], w[b + PER_SQUARE],
-    )  # fmt: skip
+def _square_distances(w, rotary, apart):
+    """Store the squared distances of legs i and i + apart, the least of their bodies'."""
+    out = SQUARE + 8 * (apart - 1)
+    for k in range(8):
+        w[out + k] = inf
+    _less_squares(w, ROD, ROD + apart, out)
+    if rotary:
+        _less_squares(w, ARM_BODY, ROD + apart, out)
+        _less_squares(w, ROD, ARM_BODY + apart, out)
+        _less_squares(w, ARM_BODY, ARM_BODY + apart, out)
 
 
 @inline
-def _arm_rod(c, w, i, j):
-    """Squared distance of the arm of leg i and the rod of leg j."""
-    p, s, b = BASE + 3 * i, LEGS + LEG * i + SOCKET, LEGS + LEG * j
-    arm, v = c[ARM_LENGTH + i], b + ROD
-    return _square_distance(
-        c[p] - w[b], c[p + 1] - w[b + 1], c[p + 2] - w[b + 2],
-        arm * w[s], arm * w[s + 1], arm * w[s + 2], w[v], w[v + 1], w[v + 2],
-        1 / (arm * arm), w[b + PER_SQUARE],
-    )  # fmt: skip
-
-
-@inline
-def _arm_arm(c, w, i, j):
-    p, q, s, t = BASE + 3 * i, BASE + 3 * j, LEGS + LEG * i + SOCKET, LEGS + LEG * j + SOCKET
-    a, b = c[ARM_LENGTH + i], c[ARM_LENGTH + j]
-    return _square_distance(
-        c[p] - c[q], c[p + 1] - c[q + 1], c[p + 2] - c[q + 2],
-        a * w[s], a * w[s + 1], a * w[s + 2], b * w[t], b * w[t + 1], b * w[t + 2],
-        1 / (a * a), 1 / (b * b),
-    )  # fmt: skip
+def _less_squares(w, p, q, out):
+    """Lower the squared distances at `out` to those of bodies p and q, where these are less."""
+    for k in range(8):
+        a, b = p + k, q + k
+        square = _square_distance(
+            w[a] - w[b], w[a + WIDE] - w[b + WIDE], w[a + 2 * WIDE] - w[b + 2 * WIDE],
+            w[a + WAY], w[a + WAY + WIDE], w[a + WAY + 2 * WIDE],
+            w[b + WAY], w[b + WAY + WIDE], w[b + WAY + 2 * WIDE],
+            w[a + PER_SQUARE], w[b + PER_SQUARE],
+        )  # fmt: skip
+        w[out + k] = square if square < w[out + k] else w[out + k]
 
 
 @inline
@@ -392,7 +410,8 @@ def _square_distance(dx, dy, dz, ux, uy, uz, vx, vy, vz, per_a, per_e):
 @inline
 def _share(value):
     """The value within 0 and 1; 0 for NaN."""
-    return min(value, 1.0) if value > 0 else 0.0
+    value = value if value < 1.0 else 1.0
+    return value if value > 0 else 0.0
 
 
 # ---- forces ---------------------------------------------------------------------------
@@ -411,8 +430,9 @@ def _forces(c, R, w, work):
     per_size = 1 / c[SIZE]
     for k in range(6):
         at = LEGS + LEG * int(c[ORDER + k])
-        r, inverse = at + ROD, 1 / w[at + LENGTH]
-        nx, ny, nz = w[r] * inverse, w[r + 1] * inverse, w[r + 2] * inverse
+        x, y, z = _rod(w, int(c[ORDER + k]))
+        inverse = w[at + PER_LENGTH]
+        nx, ny, nz = x * inverse, y * inverse, z * inverse
         ax, ay = w[at + LEVER] * per_size, w[at + LEVER + 1] * per_size
         az = w[at + LEVER + 2] * per_size
         matrix[0, k], matrix[1, k], matrix[2, k] = nx, ny, nz
@@ -435,7 +455,7 @@ def _forces(c, R, w, work):
         if c[ROTARY] == 1:
             at = LEGS + LEG * i
             along = _dot((w[at + SOCKET + 3], w[at + SOCKET + 4], w[at + SOCKET + 5]), w, i, 1.0)
-            value *= c[ARM_LENGTH + i] * along / w[at + LENGTH]
+            value *= c[ARM_LENGTH + i] * along * w[at + PER_LENGTH]
         least = min(value - c[FORCES + 2 * i], c[FORCES + 2 * i + 1] - value)
         # at a singularity no forces hold the load
         least = least if (determinant != 0) & (abs(least) < inf) else -inf
