@@ -20,7 +20,8 @@ LEGS = ("652.1", "660.3", "655.0", "648.8", "671.2", "639.9")
 POSE = ("20", "-1e1", "610", "5", "3", "-4")
 FAMILIES = {
     "plot": ["pose", "modes", "workspace", "trajectory", "errors"],
-    "export": ["c"],
+    "export": ["c", "mjcf", "sdf", "urdf"],
+    "import": ["mjcf", "sdf"],
     "train": ["", "default", "paper"],
 }
 PAGES = [[c, *([s] if s else [])] for c in COMMANDS for s in FAMILIES.get(c, [""])]

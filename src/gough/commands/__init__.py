@@ -22,6 +22,7 @@ COMMANDS = {
     ),
     "warmup": ("gough.commands.warmup", "run", "Compile beforehand what first answers wait for."),
     "export": ("gough.commands.export", "FORMATS", "A machine for other programs, such as C."),
+    "import": ("gough.commands.import_", "FORMATS", "A platform from a model for a simulator."),
     "dataset": ("gough.commands.dataset", "run", "Poses and leg readings to train networks on."),
     "train": ("gough.commands.train", "run", "Train a network that guesses a machine's poses."),
     "evaluate": ("gough.commands.evaluate", "run", "Compare the errors of first guesses."),

@@ -75,4 +75,53 @@ def mjcf(
     return 0
 
 
-FORMATS = {"c": c, "mjcf": mjcf}
+def sdf(
+    *,
+    platform: PlatformName,
+    out: Annotated[str, option(metavar="FILE.sdf", aliases=["-o"])],
+    force: Annotated[bool, option()] = False,
+) -> int:
+    """Write a model for Gazebo: legs, and loops closed by ball joints.
+
+    gough export sdf -p rubin_camera -o model.sdf
+
+    Lengths are in metres. Joints leg1 to leg6 are 0 at home. Not every physics engine of Gazebo
+    keeps loops closed; see docs/simulators.md. Masses are not the machine's: put its own in.
+
+    Args:
+        out: Write this file.
+        force: Replace a file that exists.
+    """
+    from gough.export.folder import write_file
+    from gough.export.sdf import to_sdf
+    from gough.platform import Platform
+
+    print(write_file(out, to_sdf(Platform.load(platform)), force))
+    return 0
+
+
+def urdf(
+    *,
+    platform: PlatformName,
+    out: Annotated[str, option(metavar="FILE.urdf", aliases=["-o"])],
+    force: Annotated[bool, option()] = False,
+) -> int:
+    """Refuse: URDF describes trees, and a hexapod has five loops. Use mjcf or sdf.
+
+    gough export mjcf -p rubin_camera -o rubin.xml
+
+    Args:
+        platform: Not used.
+        out: Not written.
+        force: Not used.
+    """
+    from gough.errors import InputError
+
+    raise InputError(
+        "URDF gives each link one parent, so it cannot state that six legs hold one platform; a "
+        "tree without the loops would let the legs fall apart. Use gough export mjcf (for MuJoCo) "
+        "or gough export sdf (for Gazebo)"
+    )
+
+
+FORMATS = {"c": c, "mjcf": mjcf, "sdf": sdf, "urdf": urdf}
