@@ -62,7 +62,7 @@ def _run(arguments: list[str]) -> int:
     except GoughError as error:
         return _print_error(f"{name}: error: {error}")
     except signals.Stopped as stop:
-        return _stopped(name, stop.number)
+        return _stopped(name, stop.number, stop.left)
     except BrokenPipeError:
         _drop_output()
         return BROKEN_PIPE
@@ -85,12 +85,14 @@ def _run(arguments: list[str]) -> int:
         number = signals.requested()
         if number is None:
             raise
-        return _stopped(name, number)  # a library turned `Stopped` into another error
+        return _stopped(
+            name, number, signals.Stopped.left
+        )  # a library turned `Stopped` into another error
 
 
-def _stopped(name: str, number: int) -> int:
+def _stopped(name: str, number: int, left: str) -> int:
     how = "interrupted" if number == signal.SIGINT else "terminated"
-    _print_error(f"{name}: {how}; no file was changed")
+    _print_error(f"{name}: {how}; {left}")
     return 128 + number
 
 

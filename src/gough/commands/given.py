@@ -103,7 +103,7 @@ def _given(where: str, words: tuple[str, ...], names: tuple[str, ...], expected:
     from gough.errors import InputError
     from gough.files.formats import GivenRow
 
-    if len(words) == 1 and not _is_number(re.split(r"[,;\s]+", words[0].strip())[0]):
+    if len(words) == 1 and not is_number(re.split(r"[,;\s]+", words[0].strip())[0]):
         return words[0]
     # numbers as one types or copies them: "1, 2, 3" in quotation marks, or commas between
     parts = re.split(r"[,;\s]+", words[0].strip()) if len(words) == 1 else words
@@ -112,12 +112,13 @@ def _given(where: str, words: tuple[str, ...], names: tuple[str, ...], expected:
         found = f"found {len(values)}: {' '.join(values)}" if values else "found nothing"
         raise InputError(f"{where}: expected {expected}, or a file; {found:.200}")
     for value in values:
-        if not _is_number(value):
+        if not is_number(value):
             raise InputError(f"{where}: expected {expected}, or a file; found {value[:40]!r}")
     return GivenRow(where, names, values)
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Return whether text is a number, with a decimal point or comma."""
     try:
         float(text.replace(",", "."))
     except ValueError:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
+from gough.commands.folder import FolderOptions, JobOptions
 from gough.commands.given import Legs, readings_given
 from gough.commands.options import Json, PlatformName, option
 
@@ -24,6 +25,7 @@ def run(
     json: Json = False,
     plot: Annotated[str | None, option(metavar="FILE")] = None,
     workers: Annotated[int | None, option(metavar="N")] = None,
+    folder: FolderOptions = JobOptions(),
 ) -> int:
     """Find every pose that leg readings allow, and certify each.
 
@@ -35,18 +37,29 @@ def run(
 
     Args:
         legs: Find the poses of these six readings, or of every row of readings in this file;
-            without it those of the readings at home.
+            without it those of the readings at home. For every file of a folder, a glob or a list,
+            also of an object store, -o is a folder.
         out: Write a row for each pose to this file, .csv or .parquet, or as CSV to standard
             output (-).
         plot: Draw all poses of the first set of readings into this file, .png, .svg or .pdf.
-        workers: Use this many threads; without it all cores.
+        workers: Use this many threads, or processes for many files; without it all cores.
     """
     from gough.commands import as_json, show
+    from gough.commands.folder import is_job, run_folder
+    from gough.commands.options import ReadingOptions
+    from gough.errors import InputError
     from gough.modes.assembly import assembly_modes
     from gough.modes.choose import choose_mode
     from gough.platform import Platform
 
     machine = Platform.load(platform)
+    if is_job(legs, out, folder):
+        if plot is not None:
+            raise InputError("--plot: draws one set of readings; leave it out for many files")
+        return run_folder(
+            "modes", legs, machine, out, folder, workers=workers, allow_failures=False, json=json,
+            reading=ReadingOptions().of(platform),
+        )  # fmt: skip
     draw = None if plot is None else _painter(plot)
     modes = assembly_modes(machine, readings_given(legs, machine, platform), workers=workers)
     choice = choose_mode(modes)

@@ -89,7 +89,11 @@ def print_summary(report: Report, platform: Platform, out: str | None, screen: C
     found = [i for i in range(len(report.counts)) if report.counts[i]]
     for i in found:
         worst = report.worst[i]
-        row = [report.outcomes[i].label, f"{report.counts[i]:,}", _share(report, i)]
+        row = [
+            report.outcomes[i].label,
+            f"{report.counts[i]:,}",
+            percentage(report.counts[i], report.rows),
+        ]
         row += ["" if np.isnan(worst) else f"{worst:.2g} {platform.unit}"] * residuals
         table.add_row(*row)
     screen.print(table)
@@ -123,12 +127,12 @@ def print_events(report: Report, screen: Console) -> None:
         )
 
 
-def _share(report: Report, i: int) -> str:
+def percentage(count: int, rows: int) -> str:
     """A percentage that is shown as 100 or 0 only where that is exact."""
-    share = 100 * report.counts[i] / report.rows
-    if 99.95 <= share < 100:
+    part = 100 * count / rows
+    if 99.95 <= part < 100:
         return "> 99.9 %"
-    return "< 0.1 %" if share < 0.05 else f"{share:.1f} %"
+    return "< 0.1 %" if part < 0.05 else f"{part:.1f} %"
 
 
 def print_invalid(report: Report, where: str) -> None:
@@ -217,8 +221,21 @@ def progress_bar() -> Iterator[Tick]:
     It draws a bar with rate and remaining time on standard error, if that is a terminal, and
     ends the command if a signal has asked for it.
     """
+    with bar() as update:
+
+        def tick(source: Source, report: Report) -> None:
+            rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"
+            update(source.done, source.total, rate)
+            signals.check()
+
+        yield tick
+
+
+@contextmanager
+def bar() -> Iterator[Callable[[int, int | None, str], None]]:
+    """Yield a function that shows how much is done, of how much, and a text, on a terminal."""
     if not sys.stderr.isatty():
-        yield lambda source, report: signals.check()
+        yield lambda done, total, text: None
         return
     from rich.progress import (
         BarColumn,
@@ -228,13 +245,7 @@ def progress_bar() -> Iterator[Tick]:
         TimeRemainingColumn,
     )
 
-    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"))
-    with Progress(*columns, TimeRemainingColumn(), console=console(errors=True)) as bar:
-        task = bar.add_task("", total=None, rate="starting")
-
-        def update(source: Source, report: Report) -> None:
-            rate = f"{report.rows / max(report.seconds, 1e-9):,.0f} rows/s"
-            bar.update(task, completed=source.done, total=source.total, rate=rate)
-            signals.check()
-
-        yield update
+    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[text]}"))
+    with Progress(*columns, TimeRemainingColumn(), console=console(errors=True)) as drawn:
+        task = drawn.add_task("", total=None, text="starting")
+        yield lambda done, total, text: drawn.update(task, completed=done, total=total, text=text)

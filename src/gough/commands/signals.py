@@ -18,7 +18,14 @@ _since = 0.0
 
 
 class Stopped(BaseException):
-    """The process was asked to end; passes through every `finally` on its way out."""
+    """The process was asked to end; passes through every `finally` on its way out.
+
+    Attributes:
+        number: of the signal.
+        left: what the command leaves behind.
+    """
+
+    left = "no file was changed"
 
     def __init__(self, number: int) -> None:
         super().__init__(number)

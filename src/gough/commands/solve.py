@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import arg
 
+from gough.commands.folder import FolderOptions, JobOptions
 from gough.commands.given import Legs
 from gough.commands.options import (
     AllowFailures,
@@ -42,6 +43,7 @@ def run(
     head: Head = 5,
     json: Json = False,
     reading: FileOptions = ReadingOptions(),
+    folder: FolderOptions = JobOptions(),
 ) -> int:
     """Calculate poses from leg readings.
 
@@ -49,13 +51,18 @@ def run(
 
     gough solve legs.parquet -p rubin_camera -o poses.parquet
 
-    Every row of readings gives a row of output with its status.
+    gough solve logs/ -p mine.toml -o poses/
 
-    Exit code 0: all poses are usable; 1: some are not; 2: nothing was written.
+    Every row of readings gives a row of output with its status. A folder of files, or one large
+    file with a folder for -o, goes on where it was stopped when the command is given again.
+
+    Exit code 0: all poses are usable; 1: some are not; 2: nothing was written, or not for every
+    file of a folder.
 
     Args:
         legs: Solve these six readings, or the columns of the six legs in this file, .csv, .txt,
-            .tsv, .xlsx or .parquet, or in text on standard input (-).
+            .tsv, .xlsx or .parquet, or in text on standard input (-); or those in every file of a
+            folder, a glob or a list, also of an object store (s3://, gs://, abfs://, hdfs://).
         seed: Start from this first guess: home, polynomial, polynomial-5 (another degree), the
             name of a network that comes with gough, or the folder of a trained one. auto is
             polynomial where the platform states a workspace, else home.
@@ -63,7 +70,7 @@ def run(
             size.
         max_iterations: Take at most this many Newton steps from each start; 0 writes the first
             guess.
-        workers: Use this many threads; without it all cores.
+        workers: Use this many threads, or processes for many files; without it all cores.
         leg_noise: Add the standard deviations of the pose that readings with this standard
             deviation (in their unit) cause; those of rotations are in the unit of --angles, else
             in radians.
@@ -80,23 +87,33 @@ def run(
     import math
 
     from gough.commands import as_json, show
+    from gough.commands.folder import is_job, run_folder
     from gough.commands.given import legs_given
     from gough.errors import InputError
     from gough.files import solve_file
     from gough.platform import Platform
 
-    given = legs_given(legs)
     allowed = {"max_shift": max_shift, "max_turn": max_turn and math.radians(max_turn)}
     allowed = {name: value for name, value in allowed.items() if value is not None}
     if allowed and not follow:
         raise InputError("--max-shift, --max-turn: limits of --follow; pass it, or leave them out")
+    settings: dict[str, Any] = {
+        "angles": angles, "leg_noise": leg_noise, "seed": seed, "tolerance": tolerance,
+        "max_iterations": max_iterations, "frame": frame, "limits": limits or None,
+        "follow": allowed if follow else None,
+    }  # fmt: skip
+    read = reading.of(platform, keep)
+    if is_job(legs, out, folder):
+        return run_folder(
+            "solve", legs, Platform.load(platform), out, folder, workers=workers, json=json,
+            allow_failures=allow_failures, reading=read, **settings,
+        )  # fmt: skip
+    given = legs_given(legs)
     machine = Platform.load(platform)
     with show.progress_bar() as progress:
         report = solve_file(
-            given, out, machine, angles=angles, leg_noise=leg_noise, progress=progress,
-            reading=reading.of(platform, keep),
-            head=0 if out else head, seed=seed, tolerance=tolerance, max_iterations=max_iterations,
-            workers=workers, frame=frame, follow=allowed if follow else None, limits=limits or None,
+            given, out, machine, progress=progress, reading=read, head=0 if out else head,
+            workers=workers, **settings,
         )  # fmt: skip
     if json:
         poses = as_json.first_poses(report, angles)

@@ -29,13 +29,25 @@ class CsvSource:
 
     See `Source`; `total` and `done` count bytes, `total` is None for a pipe, `metadata` is empty.
 
+    Args:
+        start, stop: bytes of the lines to read, for some lines of a file; the header is read too.
+        before: lines of the file before `start`.
+
     Raises:
         InputError: the file is empty, is not text, or has a header and no rows.
     """
 
     def __init__(
-        self, file: BinaryIO, where: str, total: int | None, reading: Reading = Reading()
+        self,
+        file: BinaryIO,
+        where: str,
+        total: int | None,
+        reading: Reading = Reading(),
+        start: int = 0,
+        stop: int | None = None,
+        before: int = 0,
     ) -> None:
+        self._sample, self._left = b"", None
         self.where, self.reading, self.done, self.metadata = where, reading, 0, {}
         self.conversions: Conversions = {}
         self._given = file
@@ -44,27 +56,38 @@ class CsvSource:
         except (OSError, EOFError, zlib.error) as error:
             raise InputError(f"{where}: is damaged or no gzip file: {error}") from None
         self.total = None if recoded else total
-        start = self._read(HEAD)
-        check_text(where, start)
-        ended = len(start) < HEAD
-        start = start.removeprefix(b"\xef\xbb\xbf")
-        while not ended and not _last_line_end(start, len(start)):
-            more = self._read(len(start))
-            start, ended = start + more, not more
-            if len(start) > LONGEST_HEADER:
+        head = self._read(HEAD)
+        check_text(where, head)
+        ended = len(head) < HEAD
+        head = head.removeprefix(b"\xef\xbb\xbf")
+        while not ended and not _last_line_end(head, len(head)):
+            more = self._read(len(head))
+            head, ended = head + more, not more
+            if len(head) > LONGEST_HEADER:
                 raise InputError(
                     f"{where}: line 1 has no end within {LONGEST_HEADER >> 10} kB; expected lines "
                     "of text that end with LF or CRLF"
                 )
-        whole = start if ended else start[: _last_line_end(start, len(start))]
+        whole = head if ended else head[: _last_line_end(head, len(head))]
         self.layout = find_layout(where, whole, reading.log)
         self.columns, self.units = self.layout.names, self.layout.units
-        self._rest = start[self.layout.size :]
+        self._rest, self._lines = head[self.layout.size :], self.layout.lines
+        if stop is not None:
+            self._take_lines(start, stop, before, whole)
         while not self._rest.strip():
             more = self._read(HEAD)
             if not more:
                 raise InputError(f"{where}: holds a header and no rows; expected a row per pose")
             self._rest += more
+
+    def _take_lines(self, start: int, stop: int, before: int, head: bytes) -> None:
+        """Go to some lines of the file; all parts take the types of kept columns from its head."""
+        self._sample = head[self.layout.size :]
+        first = self.done - len(self._rest)  # byte after the header
+        self._lines = max(before, self._lines)
+        self._file.seek(max(start, first))
+        self.total = self._left = stop - max(start, first)
+        self.done, self._rest = 0, b""
 
     def rename(self, names: list[str]) -> None:
         self.columns = names
@@ -78,7 +101,7 @@ class CsvSource:
         for line, data in self._chunks(self.reading.block_rows):
             if typed:
                 text = {name: pa.string() for name in keep if name not in numbers}
-                table = self._block(data, line, text, keep_bad=True).table
+                table = self._block(self._sample or data, line, text, keep_bad=True).table
                 types |= {name: _number_type(table.column(name)) for name in text}
                 typed = False
             block = self._block(data, line, types, self.reading.keep_bad_rows)
@@ -94,6 +117,9 @@ class CsvSource:
     # ---- bytes to lines ---------------------------------------------------------------
 
     def _read(self, count: int) -> bytes:
+        if self._left is not None:
+            count = min(count, self._left)
+            self._left -= count
         try:
             data = self._file.read(count)
         except (OSError, EOFError, zlib.error) as error:
@@ -104,7 +130,7 @@ class CsvSource:
 
     def _chunks(self, rows: int) -> Iterator[tuple[int, bytes]]:
         """(number of the first line, whole lines) until the end of the file."""
-        line, rest = 1 + self.layout.lines, self._rest
+        line, rest = 1 + self._lines, self._rest
         per_row = (rest.find(b"\n") + 1) or len(rest)
         size = max(rows * per_row, 1 << 8)
         while data := rest + (self._read(size - len(rest)) if len(rest) < size else b""):

@@ -222,7 +222,7 @@ def _open(path: Given, reading: Reading) -> Source:
             with file:
                 return open_sheet(file, where, reading)
         size = part.place.info().size if part.place.store else os.fstat(file.fileno()).st_size
-        return CsvSource(file, where, size or None, reading)
+        return CsvSource(file, where, size or None, reading, part.start, part.stop, part.before)
     except BaseException:
         file.close()
         raise

@@ -49,7 +49,7 @@ class Job:
     out: Place
     reading: Reading = Reading()
     options: Mapping[str, Any] = field(default_factory=dict)
-    ending: Literal["", ".csv", ".parquet"] = ""
+    ending: str = ""
     shard_rows: int = SHARD_ROWS
     network: str = ""
     version: str = ""
@@ -62,7 +62,7 @@ class Job:
         out: str | Path,
         *,
         reading: Reading = Reading(),
-        ending: Literal["", ".csv", ".parquet"] = "",
+        ending: str = "",
         shard_rows: int = SHARD_ROWS,
         **options: Any,
     ) -> Job:

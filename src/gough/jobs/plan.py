@@ -7,23 +7,20 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path, PurePosixPath
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 from pyarrow import fs
 
 from gough.errors import GoughError, InputError
-from gough.files.formats import FilePart, file_format
+from gough.files.formats import file_format
 from gough.files.stores import Place, reason
+from gough.jobs.cut import Parts, parts
 from gough.jobs.job import Job, Unit
 
 LISTED = re.compile(r".*\.(parquet|csv|csv\.gz)", re.IGNORECASE)  # what a folder's files are
 MAGIC = re.compile(r"[*?[]")
-SMALL = 8  # bytes a row: smaller files than this have no more rows than a unit
 REQUESTS = 16  # to a store at the same time
 log = logging.getLogger("gough")
 
@@ -57,12 +54,9 @@ def plan(job: Job, inputs: Sequence[str | Path]) -> list[Unit]:
         GoughError: nothing to read, an output that is an input, two inputs with one output.
     """
     found = find(inputs, job.out)
-    ahead = ThreadPoolExecutor(REQUESTS if found[0].place.store else 1)
-    with ahead:
-        parts = ahead.map(partial(_parts, job), found)
-        units = [
-            unit for file, cut in zip(found, parts, strict=True) for unit in _units(file, cut, job)
-        ]
+    with ThreadPoolExecutor(REQUESTS if found[0].place.store else 1) as ahead:
+        cuts = ahead.map(lambda file: parts(job, file.place, file.size), found)
+        units = [unit for file in found for unit in _units(file, next(cuts), job)]
     names: dict[str, Unit] = {}
     for unit in units:
         other = names.setdefault(unit.name, unit)
@@ -72,6 +66,20 @@ def plan(job: Job, inputs: Sequence[str | Path]) -> list[Unit]:
                 "in two calls, with two folders to write to"
             )
     return units
+
+
+def _units(file: Found, cut: Parts, job: Job) -> list[Unit]:
+    """Units of a file."""
+    ending = job.ending or file_format(file.name, read=True)
+    stem = re.sub(r"\.gz$", "", file.name, flags=re.IGNORECASE)
+    stem = stem.removesuffix(PurePosixPath(stem).suffix)
+    names = [stem + ending]
+    if len(cut) > 1:
+        names = [f"{stem}-{i:05}-of-{len(cut):05}{ending}" for i in range(1, len(cut) + 1)]
+    return [
+        Unit(part, name, round(share * file.size), file.changed, file.name, (i, len(cut)))
+        for i, ((part, share), name) in enumerate(zip(cut, names, strict=True), 1)
+    ]
 
 
 # ---- names ----------------------------------------------------------------------------
@@ -198,62 +206,3 @@ def _translated(pattern: str) -> str:
         out += {"*": "[^/]*", "?": "[^/]"}.get(pattern[i], re.escape(pattern[i]))
         i += 1
     return out
-
-
-# ---- parts ----------------------------------------------------------------------------
-
-
-def _units(file: Found, parts: list[tuple[FilePart, float]], job: Job) -> list[Unit]:
-    """Units of a file, whose parts come with their shares of its bytes."""
-    ending = job.ending or file_format(file.name, read=True)
-    path = PurePosixPath(file.name)
-    if path.suffix.lower() == ".gz":
-        path = path.with_suffix("")
-    stem = file.name[: len(str(path)) - len(path.suffix)] if path.suffix else str(path)
-    count = len(parts)
-    return [
-        Unit(
-            part, f"{stem}-{i:05}-of-{count:05}{ending}" if count > 1 else stem + ending,
-            round(share * file.size), file.changed, file.name, (i, count),
-        )
-        for i, (part, share) in enumerate(parts, 1)
-    ]  # fmt: skip
-
-
-def _parts(job: Job, file: Found) -> list[tuple[FilePart, float]]:
-    """Cut a file into parts of at most `job.shard_rows` rows, as far as its row groups allow.
-
-    A damaged file is one part, whose unit will say so. Rows that are followed one after another
-    are not cut.
-    """
-    whole = [(FilePart(file.place), 1.0)]
-    if job.options.get("follow") is not None or file.size <= SMALL * job.shard_rows:
-        return whole
-    try:
-        if file_format(file.place.path, read=True) == ".parquet":
-            return _parquet_parts(job, file)
-    except GoughError:
-        pass
-    return whole
-
-
-def _parquet_parts(job: Job, file: Found) -> list[tuple[FilePart, float]]:
-    with closing(file.place.open()) as opened:
-        try:
-            facts = pq.ParquetFile(opened).metadata
-        except (pa.ArrowException, OSError):
-            return [(FilePart(file.place), 1.0)]
-    rows = [facts.row_group(i).num_rows for i in range(facts.num_row_groups)]
-    cuts, held = [0], 0
-    for i, count in enumerate(rows):
-        if held and held + count > job.shard_rows:
-            cuts.append(i)
-            held = 0
-        held += count
-    ends = [*cuts[1:], len(rows)]
-    if len(cuts) == 1:
-        return [(FilePart(file.place), 1.0)]
-    return [
-        (FilePart(file.place, start, stop, sum(rows[:start])), sum(rows[start:stop]) / sum(rows))
-        for start, stop in zip(cuts, ends, strict=True)
-    ]

@@ -116,7 +116,7 @@ def _finished(job: Job, units: Sequence[Unit]) -> dict[str, Made]:
         GoughError: the folder holds outputs of another job; with what differs.
     """
     old = read_json(job.out / f"{FOLDER}/job.json")
-    differ = [] if old is None else [f"all of it: {text}" for text in differences(old, job.facts)]
+    differ = [] if old is None else differences(old, job.facts)
     found: dict[str, Made] = {}
 
     def look(unit: Unit) -> Made | str | None:

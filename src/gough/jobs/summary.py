@@ -28,6 +28,8 @@ class Summary:
         unusable: rows without a usable result.
         notes: what a user should know of inputs, and of how many.
         seconds: time taken by this run.
+        rows_made: rows of the outputs made by this run.
+        skipped_bytes: size of the inputs whose outputs were there.
     """
 
     job: Job
@@ -40,6 +42,7 @@ class Summary:
     notes: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     rows_made: int = 0
+    skipped_bytes: int = 0
 
     def add(self, made: Made) -> None:
         """Count a unit."""
@@ -49,6 +52,7 @@ class Summary:
         self.made += not made.skipped
         self.skipped += made.skipped
         self.rows_made += 0 if made.skipped else made.rows
+        self.skipped_bytes += made.unit.size if made.skipped else 0
         self.unusable += made.failures
         for label, count in made.counts.items():
             self.counts[label] = self.counts.get(label, 0) + count
