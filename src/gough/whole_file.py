@@ -32,7 +32,7 @@ def write_whole(path: str | Path, content: bytes) -> None:
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[BinaryIO]:
+def replacing(path: str | Path, *, tidy: bool = True) -> Iterator[BinaryIO]:
     """Open a binary file that replaces `path` when the block ends without an error.
 
     It is written as PATH.PID.partial in the same folder, flushed to the disk, given the old
@@ -40,6 +40,11 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     removed, and the file at `path` is unchanged. Only a process that is killed outright leaves
     the .partial file behind; the next one to write `path` removes it. A symbolic link stays: its
     target is replaced. A pipe or a device, which cannot be replaced, is written directly.
+
+    Args:
+        path: the file.
+        tidy: remove what killed processes left of it, for which the whole folder is listed; see
+            `remove_left_behind` for many files.
 
     Raises:
         GoughError: the folder or the disk does not allow it.
@@ -57,7 +62,8 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     temporary = target.with_name(f"{target.name}.{os.getpid()}.partial")
     file = None
     try:
-        _remove_left_behind(target)
+        if tidy:
+            remove_left_behind(target.parent, re.escape(target.name))
         file = _open_new(temporary)
         _lock(file.fileno())
         yield file
@@ -126,14 +132,18 @@ def _open_new(path: Path) -> BinaryIO:
     return os.fdopen(handle, "wb", buffering=BUFFER)
 
 
-def _remove_left_behind(target: Path) -> None:
-    """Delete the .partial files of `target` that killed processes left.
+def remove_left_behind(folder: str | Path, names: str = ".+") -> None:
+    """Delete the .partial files in a folder that killed processes left.
 
     A file is deleted only where no process here has the number in its name, and nobody, not even
     on another machine or in another container, has it locked.
+
+    Args:
+        folder: the folder.
+        names: pattern of the names of the files that they were to become.
     """
-    name = re.compile(re.escape(target.name) + r"\.([1-9][0-9]{0,9})\.partial")
-    with os.scandir(target.parent) as entries:
+    name = re.compile(rf"(?:{names})\.([1-9][0-9]{{0,9}})\.partial", re.DOTALL)
+    with os.scandir(folder) as entries:
         left = [(entry.path, found) for entry in entries if (found := name.fullmatch(entry.name))]
     for path, found in left:
         with suppress(OSError):  # no right to open or delete it, or gone already

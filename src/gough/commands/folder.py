@@ -59,7 +59,8 @@ def is_job(words: tuple[str, ...], out: str | None, jobs: JobOptions) -> bool:
     """Return whether a command line means many files, or one to be written in parts."""
     from gough.commands.given import is_number
 
-    if not words or "-" in words or is_number(words[0].strip().split(" ")[0].rstrip(",;")):
+    first = " ".join(words).split()[:1]
+    if "-" in words or not first or is_number(first[0].rstrip(",;")):
         return False
     if len(words) > 1 or jobs != JobOptions():
         return True
@@ -70,7 +71,7 @@ def _is_many(word: str) -> bool:
     """Return whether a word is a folder or a glob."""
     if "://" in word:
         return _is_folder(word) or any(sign in word for sign in "*[")
-    return os.path.isdir(word) or (any(sign in word for sign in "*?[") and not os.path.exists(word))
+    return _is_folder(word) or (any(sign in word for sign in "*?[") and not os.path.exists(word))
 
 
 def _is_folder(name: str) -> bool:

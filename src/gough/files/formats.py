@@ -85,10 +85,12 @@ class Target:
     Attributes:
         place: the file.
         metadata: gives text for the file to carry, when all rows are written; Parquet only.
+        tidy: as for `replacing`.
     """
 
     place: Place
     metadata: Callable[[], Mapping[str, str]] = dict
+    tidy: bool = True
 
     def __str__(self) -> str:
         return str(self.place)
@@ -248,7 +250,7 @@ def open_sink(path: Out, metadata: Mapping[str, str]) -> Iterator[Sink]:
         return
     ending = file_format(path)
     target = path if isinstance(path, Target) else Target(Place.of(path))
-    with written(target.place) as file:
+    with written(target.place, tidy=target.tidy) as file:
         if ending == ".csv":
             yield CsvSink(file)
             return

@@ -26,7 +26,7 @@ from gough.whole_file import replacing
 
 STORE = re.compile(r"(s3|gs|gcs|abfss?|hdfs|viewfs)://", re.IGNORECASE)
 SECRET = re.compile("secret|token|key|password|signature|^sig$", re.IGNORECASE)
-ADDRESS = re.compile(r"(?<=://)[^/?#\s@]*@|(?<=\S)\?[^\s'\"]*")
+USER, OPTIONS = re.compile(r"(?<=://)[^/?#\s@]*@"), re.compile(r"(://[^\s?'\"]*)\?[^\s'\"]*")
 
 
 @dataclass(frozen=True)
@@ -102,18 +102,18 @@ class Place:
 
 
 @contextmanager
-def written(place: Place) -> Iterator[BinaryIO]:
+def written(place: Place, *, tidy: bool = True) -> Iterator[BinaryIO]:
     """Open a file that appears whole at a place when the block ends without an error.
 
-    On this machine see `replacing`. For a store the file is made in the folder of temporary files
-    and uploaded when it is whole, in one call: a stream to a store that is closed early, even by
-    an error, leaves the part that it got.
+    On this machine see `replacing`, also for `tidy`. For a store the file is made in the folder of
+    temporary files and uploaded when it is whole, in one call: a stream to a store that is closed
+    early, even by an error, leaves the part that it got.
 
     Raises:
         GoughError: the place cannot be written; what stood there is unchanged.
     """
     if not place.store:
-        with replacing(place.path) as file:
+        with replacing(place.path, tidy=tidy) as file:
             yield file
         return
     with tempfile.TemporaryFile() as file:
@@ -154,4 +154,4 @@ def reason(error: Exception) -> str:
 
 def without_credentials(text: str) -> str:
     """Text without users, passwords and options in the URLs that it holds."""
-    return ADDRESS.sub("", text)
+    return OPTIONS.sub(r"\1", USER.sub("", text))

@@ -51,6 +51,7 @@ def run_local(
     context = multiprocessing.get_context("spawn")
     waiting = [_Try(unit) for unit in reversed(units)]
     busy: list[_Worker] = []
+    ended: list[_Worker] = []
     try:
         busy = [_Worker(context, job) for _ in range(count)]
         for worker in busy:
@@ -71,13 +72,14 @@ def run_local(
                     worker.give(waiting.pop())
                 else:
                     busy.remove(worker)
-                    worker.end()
+                    worker.connection.close()  # it ends
+                    ended.append(worker)
                 if done is not None:
                     yield done
     finally:
         for worker in busy:
             worker.process.terminate()
-        for worker in busy:
+        for worker in busy + ended:
             worker.process.join(PATIENCE)
             worker.process.kill()
 
@@ -123,9 +125,6 @@ class _Worker:
     def exit_code(self) -> int | None:
         self.process.join(PATIENCE)
         return self.process.exitcode
-
-    def end(self) -> None:
-        self.connection.close()
 
 
 def _serve(connection: Connection, job: Job) -> None:

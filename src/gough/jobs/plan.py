@@ -119,7 +119,7 @@ def _listed(place: Place) -> tuple[Place, list[fs.FileInfo]]:
         chosen = [one for one in files if LISTED.fullmatch(one.base_name)]
         if len(chosen) < len(files):
             log.warning(
-                "%s: %d other files are left alone; give them as a glob to read them",
+                "%s: files of other kinds are left alone (%d); give a glob to read them",
                 place, len(files) - len(chosen),
             )  # fmt: skip
         return place, chosen

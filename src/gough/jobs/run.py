@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from gough.jobs.outputs import (
 )
 from gough.jobs.plan import REQUESTS, plan
 from gough.jobs.summary import Summary
+from gough.whole_file import remove_left_behind
 
 Engine = Callable[..., Generator[Made, None, None]]
 NAMED = 5  # differing outputs that an error lists
@@ -61,6 +62,7 @@ def run_job(
     if not job.out.store:
         _make_folder(job.out)
     done = {} if force else _finished(job, units)
+    _tidy(job, units)
     write_json(job.out / f"{FOLDER}/job.json", job.facts)
     summary = Summary(job, len(units))
     todo = []
@@ -78,7 +80,10 @@ def run_job(
                     tick(summary, made, units)
                 if made.error and stop_at_first_error:
                     raise GoughError(made.error)
+                if made.error and job.out.store:
+                    job.out.info()  # a store that does not answer fails all other units too
     finally:
+        _tidy(job, units)  # after workers that died
         summary.seconds = time.perf_counter() - began
         write_json(job.out / f"{FOLDER}/report.json", summary.facts())
     return summary
@@ -107,6 +112,16 @@ def _make_folder(out: Place) -> None:
         raise GoughError(f"{out}: is a file; name a folder to write to") from None
     except OSError as error:
         raise GoughError(f"{out}: cannot be made: {error.strerror}") from None
+
+
+def _tidy(job: Job, units: Sequence[Unit]) -> None:
+    """Remove the unfinished files of killed jobs."""
+    if job.out.store:
+        return  # an upload that was not completed is no object
+    for folder in {Path(job.out.path, unit.name).parent for unit in units}:
+        if folder.is_dir():
+            with suppress(OSError):
+                remove_left_behind(folder)
 
 
 def _finished(job: Job, units: Sequence[Unit]) -> dict[str, Made]:

@@ -54,7 +54,7 @@ def make(job: Job, unit: Unit, progress: Progress | None = None, threads: int = 
             place = output_place(job, unit)
             if not place.store:
                 Path(place.path).parent.mkdir(parents=True, exist_ok=True)
-            _convert(job, unit, Target(place, metadata), tick, threads)
+            _convert(job, unit, Target(place, metadata, tidy=False), tick, threads)
             if file_format(str(place)) == ".csv":
                 write_record(job, unit, metadata())
         except Exception as error:  # of one file among many: the others go on
