@@ -165,7 +165,7 @@ def test_version(gough):
         (["solve", "x.csv", "-p", "referense"], "did you mean 'reference'"),
         (["solve", "x.doc", "-p", "reference"], "must end in .csv or .parquet"),
         (["solve", "none.csv", "-p", "reference"], "none.csv: cannot be read: No such file"),
-        (["solve", ".", "-p", "reference"], "must end in .csv or .parquet"),
+        (["solve", ".", "-p", "reference"], ".: many files are written to a folder"),
         (["platforms", "rubin"], "the catalog has"),
     ],
 )

@@ -61,7 +61,7 @@ def test_exit_codes_are_those_of_one_file(logs, readings):
     [
         ("solve logs -p reference", "written to a folder"),
         ("solve logs -p reference -o -", "written to a folder"),
-        ("solve logs -p reference -o all.csv", "is one file"),
+        ("solve logs -p reference -o all.csv", "all.csv is one file"),
         ("solve nowhere/ -p reference -o poses", "there is no such file"),
         ("solve logs -p reference -o logs", "holds the inputs themselves"),
         ("solve logs -p reference -o logs/notes.txt", "is a file"),

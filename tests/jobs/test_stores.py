@@ -72,7 +72,7 @@ def test_a_job_in_a_store_survives_a_bad_network(tmp_path, platform, logs, readi
 
 def put(key: str, content: bytes) -> None:
     """Write an object whatever its name, as other programs can."""
-    from moto.core import DEFAULT_ACCOUNT_ID
+    from moto.core.models import DEFAULT_ACCOUNT_ID
     from moto.s3.models import s3_backends
 
     s3_backends[DEFAULT_ACCOUNT_ID]["aws"].put_object("bucket", key, content)

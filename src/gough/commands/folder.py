@@ -59,27 +59,32 @@ def is_job(words: tuple[str, ...], out: str | None, jobs: JobOptions) -> bool:
     """Return whether a command line means many files, or one to be written in parts."""
     from gough.commands.given import is_number
 
-    first = " ".join(words).split()[:1]
-    if "-" in words or not first or is_number(first[0].rstrip(",;")):
+    first = [*" ".join(words).split(), "-"][0]
+    if "-" in (first, *words) or is_number(first.rstrip(",;")):
         return False
     if len(words) > 1 or jobs != JobOptions():
         return True
-    return _is_many(words[0]) or (out is not None and out != "-" and _is_folder(out))
+    return any(map(_is_many, words)) or (out is not None and out != "-" and _is_folder(out))
 
 
 def _is_many(word: str) -> bool:
     """Return whether a word is a folder or a glob."""
     if "://" in word:
         return _is_folder(word) or any(sign in word for sign in "*[")
-    return _is_folder(word) or (any(sign in word for sign in "*?[") and not os.path.exists(word))
+    return (
+        _is_folder(word)
+        or os.path.isdir(word)
+        or (any(sign in word for sign in "*?[") and not os.path.exists(word))
+    )
 
 
 def _is_folder(name: str) -> bool:
-    """Return whether a name is that of a folder, which need not exist."""
+    """Return whether a name is that of a folder: it ends in / or is one, and not in .csv."""
     if "://" in name:
         name = name.partition("?")[0]
         return name.endswith("/") or "." not in name.rpartition("/")[2]
-    return name.endswith(("/", os.sep)) or os.path.isdir(name)
+    called = not name.lower().endswith(ENDINGS) and os.path.isdir(name)
+    return name.endswith(("/", os.sep)) or called
 
 
 def run_folder(
@@ -100,10 +105,11 @@ def run_folder(
     from gough.jobs import Job, run_job
     from gough.jobs.job import SHARD_ROWS
 
-    if out is None:
-        raise InputError("-o: missing; many files are written to a folder, such as -o poses/")
-    if out == "-" or (not _is_folder(out) and out.lower().endswith(ENDINGS)):
-        raise InputError(f"{out}: is one file; these are written to a folder, such as -o poses/")
+    if out is None or out == "-" or out.lower().endswith(ENDINGS):
+        found = "pass one" if out is None else f"{out} is one file"
+        raise InputError(
+            f"{words[0]}: many files are written to a folder, such as -o poses/; {found}"
+        )
     shard_rows = SHARD_ROWS if jobs.shard_rows is None else jobs.shard_rows
     job = Job.of(
         command, platform, out, shard_rows=shard_rows,
