@@ -11,6 +11,7 @@ alone, `universal` the seed: the network and its damped Newton steps.
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 import time
@@ -40,6 +41,10 @@ WIDE = dict.fromkeys(NARROW, (0.15, 60)) | {
 }  # fmt: skip
 
 
+TUNED, RUNS = ("reference", "nasa_msfc", "rubin_simulink"), Path("runs/tuning")
+TIMES = (10, 20, 40, 60, 120, 300, 600)  # [s]
+
+
 @dataclass(frozen=True)
 class Case:
     """A machine with a box as its workspace, poses of it and their readings."""
@@ -65,6 +70,13 @@ class Case:
 
         ends = count_newton_ends(self.platform, guess, self.pose, self.legs)
         return f"{ends.count - ends.true:,}"
+
+    def newton(self, guess: gough.Pose) -> tuple[np.ndarray, np.ndarray, gough.Pose]:
+        """Which rows (N,) plain Newton takes to the true pose, which anywhere, and where to."""
+        from gough.learn.metrics import plain_newton, same_pose
+
+        end, converged = plain_newton(self.platform, guess, self.legs)
+        return converged & same_pose(self.platform, end, self.pose), converged, end
 
 
 class Network:
@@ -120,6 +132,33 @@ def wide() -> None:
     """The same over wide boxes: mean and worst error in %, and what plain Newton misses."""
     both = lambda case, guess: f"{_mean_and_worst(case.errors(guess))}; {case.missed(guess)}"  # noqa: E731
     _table(WIDE, POSES, both)
+
+
+def misses() -> None:
+    """Where plain Newton ends for the poses that it misses from the network in wide boxes.
+
+    A twin is another pose with the same readings and home's sign of det J: readings alone cannot
+    tell which of the two is meant.
+    """
+    heads = ("machine", "missed", "at a twin", "beyond a singularity", "no end, `gough.solve` true",
+             "no end, nor that", "of these the cubic misses", "predicted where none ends, %")  # fmt: skip
+    print(f"| {' | '.join(heads)} |\n|---|{'---:|' * 7}")
+    for name, box in WIDE.items():
+        case = Case.of(gough.Platform.load(name), box, POSES)
+        guess = UniversalSeed(case.platform).guess_with_error(case.legs)
+        right, converged, end = case.newton(guess.pose)
+        missed = ~right
+        twin = missed & converged & (gough.assembly_sign(case.platform, end) > 0)
+        none = missed & ~converged
+        again = gough.solve(case.platform, case.legs[none], seed="universal").pose
+        solved = int(np.sum(again.distance(case.pose[none])[0] < 1e-6 * case.platform.size))
+        cubic = ~case.newton(gough.PolynomialSeed(case.platform, 3).guess(case.legs))[0]
+        share = 100 * guess.position_error[none] / case.platform.size
+        cells = [missed.sum(), twin.sum(), (missed & converged & ~twin).sum(), solved,
+                 none.sum() - solved, (missed & cubic).sum(),
+                 " ".join(f"{v:.2g}" for v in sorted(share))]  # fmt: skip
+        print(f"| {name} | {' | '.join(map(str, cells))} |", flush=True)
+    print()
 
 
 def _table(boxes: dict, count: int, cell: Callable[[Case, gough.Pose], str],
@@ -285,8 +324,8 @@ def tuning(budget: str = "60s", whole: str = "10m") -> None:
 
     print("| machine | universal | network alone | tuned 60 s | network alone | ResMLP 10 min |")
     print("|---|---:|---:|---:|---:|---:|")
-    for name in ("reference", "nasa_msfc", "rubin_simulink"):
-        platform, folder = gough.Platform.load(name), Path("runs/tuning") / name
+    for name in TUNED:
+        platform, folder = gough.Platform.load(name), RUNS / name
         pose, legs = held_out(platform, POSES, False)
         finetune(platform, folder / "tuned", budget=budget)
         config = PRESETS["default"].with_run(budget=whole, clock="processor", threads=1)
@@ -298,15 +337,50 @@ def tuning(budget: str = "60s", whole: str = "10m") -> None:
         ] + [NetworkSeed(platform, folder / "new")]  # fmt: skip
         errors = [seed.guess(legs).distance(pose)[0].mean() for seed in guesses]
         print(f"| {name} | {' | '.join(f'{e:.3g}' for e in errors)} |", flush=True)
-    print("curves: metrics.csv of each run in runs/tuning\n")
+    print()
+    curves()
+
+
+def curves() -> None:
+    """Mean position error while both train, in units of the machine, after so many seconds.
+
+    Reads what `tuning` has left in runs/tuning; "tuned" is the network alone, without the steps.
+    """
+    print(f"| machine | network | {' | '.join(f'{t} s' for t in TIMES)} |")
+    print(f"|---|---|{'---:|' * len(TIMES)}")
+    for name in TUNED:
+        size = gough.Platform.load(name).size
+        for run, column, unit in (("tuned", "narrow_error", size), ("new", "trans", 1.0)):
+            with (RUNS / name / run / "metrics.csv").open(newline="") as file:
+                rows = [
+                    (float(r["seconds"]), unit * float(r[column])) for r in csv.DictReader(file)
+                ]
+            last = [[e for s, e in rows if s <= 1.02 * t] for t in TIMES]
+            whole = rows[-1][0] + 10  # the last measurement is a few seconds before the end
+            known = [t <= whole and bool(e) for t, e in zip(TIMES, last, strict=True)]
+            cells = [f"{e[-1]:.2g}" if k else "" for k, e in zip(known, last, strict=True)]
+            print(f"| {name} | {run} | {' | '.join(cells)} |")
+    print()
 
 
 TABLES = {
     f.__name__: f
-    for f in (accuracy, random, newton, wide, predicted, speed, auto, distance, tuning)
+    for f in (
+        accuracy,
+        random,
+        newton,
+        wide,
+        misses,
+        predicted,
+        speed,
+        auto,
+        distance,
+        tuning,
+        curves,
+    )
 }
 
 if __name__ == "__main__":
-    for chosen in sys.argv[1:] or [name for name in TABLES if name != "tuning"]:
+    for chosen in sys.argv[1:] or [name for name in TABLES if name not in ("tuning", "curves")]:
         print(f"## {chosen}\n\n{TABLES[chosen].__doc__}\n")
         TABLES[chosen]()

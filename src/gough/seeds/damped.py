@@ -201,13 +201,26 @@ def _struts(home: HomeStruts, t: Array, wxyz: Array) -> tuple[Array, Array, Arra
 
 
 def _gain(strut: Array, lever: Array, miss: Array) -> Callable[[Array], Array]:
-    """Map of strut errors (M, 6, N) to steps (6, M, N), with the matrix of these struts."""
-    J = jacobian(strut, lever)  # (M, N, 6, 6)
-    back = np.swapaxes(J, -1, -2)
-    damping = np.mean(miss * miss, axis=1) + np.finfo(float).eps
-    matrix = np.linalg.solve(back @ J + damping[..., None, None] * np.eye(6), back)
+    """Map of strut errors (M, 6, N) to steps (6, M, N), with the matrix of these struts.
+
+    The matrices are factored all at once, L D L^T by columns: LAPACK takes one at a time.
+    """
+    J = np.moveaxis(jacobian(strut, lever), (-1, -2), (0, 2))  # (6, M, legs, N)
+    matrix = np.einsum("amin,bmin->abmn", J, J)
+    least = np.finfo(float).eps
+    damping = np.mean(miss * miss, axis=1) + least
+    pivots, columns = [], []
+    for k in range(6):
+        pivots.append(np.maximum(matrix[0, 0] + damping, least))
+        columns.append(matrix[1:, 0] / pivots[k])
+        matrix = matrix[1:, 1:] - columns[k][:, None] * matrix[0, 1:]
 
     def gain(errors: Array) -> Array:
-        return np.moveaxis((matrix @ np.swapaxes(errors, 1, 2)[..., None])[..., 0], -1, 0)
+        x = np.sum(J * errors, axis=2)
+        for k, column in enumerate(columns):
+            x[k + 1 :] -= column * x[k]
+        for k in reversed(range(6)):
+            x[k] = x[k] / pivots[k] - np.sum(columns[k] * x[k + 1 :], axis=0)
+        return x
 
     return gain

@@ -57,13 +57,17 @@ class Universal(nn.Module):
     def correct(self, pairs: Tensor, features: Tensor) -> Tensor:
         """Corrections (M, 6, N) from (P, M, 6, 6) and (L, M, 6, N)."""
         codes, legs = self.encoder(pairs)
+        return channels(self.last, self.hidden(codes, legs, features))[0]
+
+    def hidden(self, codes: Tensor, legs: Tensor, features: Tensor) -> Tensor:
+        """Activations (C, M, 6, N) after the layers, for a machine as the encoder gives it."""
         offsets = [layer(legs).permute(2, 0, 1)[..., None] for layer in self.offsets]
         h = channels(self.first, features) + offsets[0]
         layers = zip(self.matrices, self.inner, self.outer, offsets[1:], strict=True)
         for matrix, inner, outer, offset in layers:
             mixed = matrix(codes).permute(3, 0, 1, 2) / 6**0.5 @ h  # (C, M, 6, 6) @ (C, M, 6, N)
             h = h + channels(outer, silu(channels(inner, torch.cat([h, mixed])) + offset))
-        return channels(self.last, h)[0]
+        return h
 
     def parameter_count(self) -> int:
         """Number of trainable parameters."""
