@@ -140,8 +140,8 @@ def misses() -> None:
     A twin is another pose with the same readings and home's sign of det J: readings alone cannot
     tell which of the two is meant.
     """
-    heads = ("machine", "missed", "at a twin", "beyond a singularity", "no end, `gough.solve` true",
-             "no end, nor that", "of these the cubic misses", "predicted where none ends, %")  # fmt: skip
+    heads = ("machine", "missed", "at a twin", "beyond a singularity", "no end, but solved",
+             "no end", "the cubic misses too", "predicted where none ends, %")  # fmt: skip
     print(f"| {' | '.join(heads)} |\n|---|{'---:|' * 7}")
     for name, box in WIDE.items():
         case = Case.of(gough.Platform.load(name), box, POSES)

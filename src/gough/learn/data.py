@@ -200,7 +200,7 @@ def _columns(platform: Platform, pose: Pose, legs: Array, layout: str, rotation:
 
 @dataclass(frozen=True, eq=False)
 class HexapodGraph:
-    """The distance graph of one platform.
+    """The distance graph of one platform: equation 3 of the DisGNet paper.
 
     Attributes:
         legs: (6, 2) nodes of each leg's edge, base joint first.
@@ -232,7 +232,7 @@ class HexapodGraph:
         return out
 
     def matrix(self, leg_edges: Array) -> Array:
-        """Distance matrices E (..., 12, 12) for lengths (..., 6) of the legs' edges."""
+        """Distance matrices E (..., 12, 12), equation 6, for lengths (..., 6) of legs' edges."""
         out = np.broadcast_to(self.constant, (*leg_edges.shape[:-1], NODES, NODES)).copy()
         out[..., self.legs[:, 0], self.legs[:, 1]] = leg_edges
         out[..., self.legs[:, 1], self.legs[:, 0]] = leg_edges

@@ -1,4 +1,4 @@
-"""Training losses: the paper's, and that of its baseline plain-MLP."""
+"""Training losses: the paper's (equations 13 to 15), and that of its baseline plain-MLP."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ BETA_OF_SIZE = 0.3
 
 def pose_loss(translation: Tensor, rotation: Tensor, wanted: Batch, beta: float) -> Tensor:
     """Mean of |t - t*| + beta |R - R*|_F over a batch, a number [platform unit].
+
+    Equations 13 to 15 of Zhu et al., DisGNet.
 
     Args:
         translation: (N, 3) [platform unit].

@@ -56,7 +56,7 @@ class Metrics:
 
 
 def measure(platform: Platform, guess: Pose, truth: Pose, legs: Array | None = None) -> Metrics:
-    """Compare guesses (N,) with the true poses (N,).
+    """Compare guesses (N,) with the true poses (N,): equations 22 to 24 of the DisGNet paper.
 
     Args:
         platform: the machine.

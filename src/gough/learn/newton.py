@@ -1,8 +1,8 @@
 """The DisGNet paper's "GPU-friendly Newton-Raphson" (Algorithm 1): a batch of poses at once.
 
 Poses are xi = log(T) in se(3), in base coordinates. Each sweep takes xi <- xi - Z F(xi) in all
-rows, with F(xi) = IK(exp(xi)) - l and Z the inverse of dF/dxi by matrix products alone. From
-Z_0 = J^T / (|J|_1 |J|_inf) the iteration
+rows (the paper's equation 21), with F(xi) = IK(exp(xi)) - l (16) and Z the inverse of J = dF/dxi
+(17) by matrix products alone. From Z_0 = J^T / (|J|_1 |J|_inf) the iteration (20)
 
     Z <- Z (13 I - JZ (15 I - JZ (7 I - JZ))) / 4
 
@@ -221,7 +221,7 @@ class _Rows:
         self.active = valid.nonzero()[:, 0]
 
     def equations(self) -> tuple[Tensor, Tensor]:
-        """F (n, 6) [platform unit] and dF/dxi (n, 6, 6) of the active rows."""
+        """F (n, 6) [platform unit] and dF/dxi (n, 6, 6) of the active rows: equations 16, 17."""
         xi, rows = self.xi[self.active], self.active
         position, rotation = se3_exp(xi)
         errors, J = self.platform.strut_errors(
@@ -231,7 +231,7 @@ class _Rows:
 
     def take(self, step: Tensor, inverse_iterations: Tensor, regular: Tensor, gamma: float,
              reach: float) -> None:  # fmt: skip
-        """Take steps (n, 6) where the Jacobian is regular; rows that have ended become inactive."""
+        """Take steps (n, 6), equation 21, where J is regular; rows that have ended leave."""
         rows = self.active
         most = torch.maximum(self.inverse_iterations[rows], inverse_iterations)
         self.inverse_iterations[rows] = most
@@ -288,7 +288,7 @@ def first_inverse(J: Tensor) -> Tensor:
 
 
 def next_inverse(Z: Tensor, JZ: Tensor) -> Tensor:
-    """Z_(f+1) of Z_f and J Z_f, each (..., n, n)."""
+    """Z_(f+1) of Z_f and J Z_f, each (..., n, n): the paper's equation 20."""
     eye = torch.eye(JZ.shape[-1], dtype=JZ.dtype, device=JZ.device)
     return Z @ (13 * eye - JZ @ (15 * eye - JZ @ (7 * eye - JZ))) / 4
 

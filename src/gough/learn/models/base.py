@@ -162,7 +162,10 @@ class PoseNetwork(nn.Module):
         return self.decode(self.raw(legs))
 
     def decode(self, raw: Tensor) -> tuple[Tensor, Tensor]:
-        """Translation (N, 3) [platform unit] and rotation (N, 3, 3) of raw numbers (N, outputs)."""
+        """Translation (N, 3) [platform unit] and rotation (N, 3, 3) of raw numbers (N, outputs).
+
+        Nine numbers become the nearest rotation: equation 12 of the DisGNet paper.
+        """
         translation = self.shift_mean + self.shift_scale * raw[:, :3]
         rest = raw[:, 3:]
         if self.rotation == "quaternion":

@@ -1,11 +1,11 @@
 """DisGNet (Zhu et al., 2024): a 2-FWL network on the hexapod's distance matrix.
 
 Every ordered pair of nodes (u, v) has a feature of width H. With d the nodes' order and e the
-distance matrix,
+distance matrix, and the numbers of the paper's equations,
 
-    h_uv  = f1(emb d_u) * f2(emb d_v) * g12(rbf e_uv) * g21(rbf e_vu)          initialisation
-    h'_uv = h_uv + W sum_j P(h_uj) * Q(h_jv) / 12                              2-FWL
-    z     = sum_uv h'_uv / 12                                                  readout
+    h_uv  = f1(emb d_u) * f2(emb d_v) * g12(rbf e_uv) * g21(rbf e_vu)      initialisation (7)
+    h'_uv = h_uv + W sum_j P(h_uj) * Q(h_jv) / 12                          2-FWL (8 to 10)
+    z     = sum_uv h'_uv / 12                                              readout (11)
 
 then dense layers, and a linear map to twelve numbers; * is element by element. The sum makes
 the message cheap, exactly:
