@@ -133,6 +133,19 @@ def test_a_mirror_image_is_another_mode_in_every_batch_size() -> None:
         assert found.pose.distance(mirror[some])[0].max() < 1e-9
 
 
+@pytest.mark.parametrize("legs", ["telescopic", "length_change"])
+def test_blocks_of_rows_get_the_statuses_that_rows_get_alone(legs) -> None:
+    """Where no workspace is stated, many rows are looked at side by side (`kernel.ways`)."""
+    platform = replace(machines.random_platform(3, legs), workspace=None)
+    readings = gough.leg_lengths(platform, _around(platform, 1_100, 5, width=0.25, angle=50))
+    low, high = np.percentile(readings, [2, 98], axis=0)
+    platform = replace(platform, stroke=np.stack([low, high], axis=-1))
+    solver = gough.Solver(platform)
+    many, few = solver(readings).status, [solver(half).status for half in np.split(readings, 2)]
+    assert {Status.CONVERGED, Status.OUTSIDE_STROKE, Status.OTHER_MODE} <= set(many)
+    np.testing.assert_array_equal(many, np.concatenate(few))
+
+
 def test_a_seed_near_the_pose_says_that_the_machine_goes_there() -> None:
     """Poses of home's sign that the straight way from home does not reach."""
     platform = replace(Platform.load("reference"), workspace=None)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 import gough
 from gough.kernel import layout, linear
 from gough.kernel.constants import from_internal, kernel_constants, solving_order, to_internal
-from gough.kernel.equations import eliminate, newton_step
+from gough.kernel.elimination import eliminate
+from gough.kernel.equations import newton_step
 from gough.kernel.jit import jit
 from gough.kernel.pose_io import put_reading
 from gough.kinematics import equivalent_struts

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough.checks import Array, as_number, as_whole
 from gough.errors import GoughError
 from gough.fk.solution import Solution
-from gough.kernel.constants import SINGULAR, kernel_constants
+from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
 from gough.kernel.rows import STEPS, settle_rows, solve_rows
 from gough.kernel.threads import in_parts
@@ -218,6 +218,8 @@ class Solver:
             troubled = self._settle_rows(flat, start, rows)
         else:
             troubled = self._solve_blocks(flat, start, rows)
+            if troubled and self._has_no_box:
+                self._accept_reached(flat, rows)
         if troubled:
             self._solve_rows(flat, np.flatnonzero(rows.status == OPEN), start, rows)
             rows.fill_invalid_with_nan()
@@ -287,6 +289,27 @@ class Solver:
             )  # fmt: skip
 
         return in_parts(work, len(legs), self.workers)
+
+    @property
+    def _has_no_box(self) -> bool:
+        """True where the status of a solved pose depends on the way to it from home alone."""
+        platform, steps = self.platform, self.max_iterations
+        return platform.workspace is None and platform.rotary is None and steps > 0
+
+    def _accept_reached(self, legs: Array, rows: Rows) -> None:
+        """Give solved rows whose pose is reached from home their status."""
+        from gough.kernel.ways import accept_reached
+
+        constants = kernel_constants(self.platform, self.singular)
+        solved = rows.residual <= self.tolerance * self.platform.size
+        chosen = np.flatnonzero((rows.status == OPEN) & solved)
+        poses = to_internal(constants, Pose.trusted(rows.position[chosen], rows.wxyz[chosen]))
+
+        def work(first: int, last: int) -> int:
+            scratch = np.zeros(COMPONENTS * WIDTH), np.empty(7 * WIDTH), *np.empty((2, WIDTH))
+            return accept_reached(constants, legs, chosen, poses, first, last, scratch, rows.status)
+
+        in_parts(work, len(chosen), self.workers)
 
     def _settle_rows(self, legs: Array, start: Start, rows: Rows) -> int:
         """Take plain Newton steps on a few rows; return how many are open or invalid."""
