@@ -27,6 +27,21 @@ settings.load_profile(
 )
 
 
+def pytest_sessionstart() -> None:
+    """Let each process of pytest-xdist compile a share of what the tests need.
+
+    Where nothing is compiled yet each would compile all of it otherwise.
+    """
+    from gough import Platform
+    from gough.commands import warmup
+
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker:
+        share, count = int(worker.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+        for work in list(warmup._jobs().values())[share::count]:
+            work(Platform.load("rubin_camera"))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests by what they need, as far as their fixtures and their folder show it."""
     for item in items:

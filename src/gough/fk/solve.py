@@ -241,8 +241,11 @@ class Solver:
         legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
         solver = replace(self, seed="home")
         solver(legs, certify=certify, limits=limits)
-        start = starting_poses(self.platform, solver.seed, legs)
-        solver._solve_rows(legs, np.arange(1), start, Rows.empty(len(legs)))
+        start, rows = starting_poses(self.platform, solver.seed, legs), Rows.empty(1)
+        solver._solve_rows(legs, np.arange(1), start, rows)
+        if len(legs) > FEW and self._has_no_box:
+            rows.status[:] = OPEN
+            solver._accept_reached(legs[:1], rows)
 
     @property
     def _is_unsure(self) -> bool:
