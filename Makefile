@@ -20,7 +20,8 @@ test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
 quick: $(VENV)/.dev
-	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n auto --dist worksteal -q -m "not (slow or torch or browser or process)" --ignore=tests/learn --ignore=tests/paper
+	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n auto --dist worksteal -q \
+		-m "not (slow or torch or browser or process or documents)" --ignore=tests/learn --ignore=tests/paper
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -29,6 +29,7 @@ def running() -> list:
     return params
 
 
+@pytest.mark.documents
 @pytest.mark.parametrize("page", running())
 def test_documents_run_and_print_what_they_say(page: Path) -> None:
     with documents.playground():

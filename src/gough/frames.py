@@ -61,7 +61,7 @@ class Frames:
     at_rest: dict[str, Pose]
 
     def __init__(self, poses: Mapping[str, Pose | ArrayLike]) -> None:
-        stated = {key: _pose(key, pose) for key, pose in poses.items()}
+        stated = {key: one_pose(f"frames.{key}", pose) for key, pose in poses.items()}
         edges = [(*_names(key), pose) for key, pose in stated.items()]
         placed = {a for a, _, _ in edges}
         usual = [name for name in USUAL if name[0] not in placed]
@@ -159,14 +159,21 @@ def frame_pose(frames: Frames, pivot: Array, name: str) -> FramePose:
     return FramePose(pivot, frames.at_rest[at_rest].inverse(), frames.moving[moving])
 
 
-def _pose(key: str, value: Pose | ArrayLike) -> Pose:
-    """One pose of a file or a caller; a position (3,) stands for no rotation."""
-    pose = value if isinstance(value, Pose) else Pose(platform_field(f"frames.{key}", value, (3,)))
+def one_pose(name: str, value: Pose | ArrayLike) -> Pose:
+    """Return a pose, or a position (3,) without rotation, as one pose of read-only arrays.
+
+    Args:
+        name: the field of the platform, for the message.
+
+    Raises:
+        PlatformError: several poses, or numbers that are none of a pose.
+    """
+    pose = value if isinstance(value, Pose) else Pose(platform_field(name, value, (3,)))
     if pose.batch:
-        raise PlatformError(f"frames.{key}: expected one pose, found batch axes {pose.batch}")
+        raise PlatformError(f"{name}: expected one pose, found batch axes {pose.batch}")
     return Pose(
-        platform_field(f"frames.{key}.position", pose.position, (3,)),
-        platform_field(f"frames.{key}.wxyz", pose.wxyz, (4,)),
+        platform_field(f"{name}.position", pose.position, (3,)),
+        platform_field(f"{name}.wxyz", pose.wxyz, (4,)),
     )
 
 

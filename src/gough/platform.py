@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from gough import limit_geometry, limit_rules, platform_checks, struts
 from gough.checks import Array, frozen, one_or_six, platform_field
 from gough.errors import PlatformError
-from gough.frames import FramePose, Frames, frame_pose
+from gough.frames import FramePose, Frames, frame_pose, one_pose
 from gough.machine_limits import MachineLimits
 from gough.platform_checks import LegKind
 from gough.pose import Pose
@@ -103,7 +103,7 @@ class Platform:
         fields = {
             "base": platform_checks.joints("base", base),
             "moving": platform_checks.joints("moving", moving),
-            "home": platform_checks.home_pose(home),
+            "home": one_pose("home", home),
             "unit": unit,
             "name": name,
             "legs": legs,

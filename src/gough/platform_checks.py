@@ -12,7 +12,6 @@ from gough.checks import Array, frozen, platform_field, platform_numbers
 from gough.errors import CONTROL, PlatformError
 from gough.frames import Frames
 from gough.machine_limits import MachineLimits
-from gough.pose import Pose
 from gough.rotary import RotaryArms
 from gough.workspace import Workspace
 
@@ -61,17 +60,6 @@ def joints(name: str, value: ArrayLike) -> Array:
     if array.ndim == 2 and array.shape[1] == 3 and len(array) != 6:
         raise PlatformError(f"{name}: expected 6 joints, one for each leg, found {len(array)}")
     return platform_field(name, value, (6, 3))
-
-
-def home_pose(value: Pose | ArrayLike) -> Pose:
-    """Return a pose, or a position (3,), as one pose of read-only arrays."""
-    pose = value if isinstance(value, Pose) else Pose(platform_field("home", value, (3,)))
-    if pose.batch:
-        raise PlatformError(f"home: expected one pose, found batch axes {pose.batch}")
-    return Pose(
-        platform_field("home.position", pose.position, (3,)),
-        platform_field("home.wxyz", pose.wxyz, (4,)),
-    )
 
 
 def check_near_origin(size: float, **points: Array) -> None:

