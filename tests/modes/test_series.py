@@ -31,14 +31,16 @@ from gough.kernel.series import (  # fmt: skip
     newton,
 )
 from gough.kinematics import equivalent_struts, strut_vectors
-from gough.modes.frames import Frames, Problem, distances, distinct, inverse, rotation
+from gough.modes.frames import (
+    Frames,
+    Problem,
+    distances,
+    distinct,
+    inverse,
+    rotation,
+    squared_lengths,
+)
 from gough.modes.starts import gaussian, start_system
-
-
-def squared_lengths(poses, base, moving):
-    """l^2 of the six struts, (..., 6)."""
-    joints = np.einsum("...ij,kj->...ki", rotation(poses), moving) + poses[..., None, :3]
-    return np.sum((joints - base) ** 2, axis=-1)
 
 
 def run(code, z, shared):

@@ -158,6 +158,12 @@ def inverse(poses: Complex) -> Complex:
     return back
 
 
+def squared_lengths(poses: Complex, base: Complex, moving: Complex) -> Complex:
+    """l^2 of the six struts, (..., 6)."""
+    joints = np.einsum("...ij,kj->...ki", rotation(poses), moving) + poses[..., None, :3]
+    return np.sum((joints - base) ** 2, axis=-1)
+
+
 def distances(a: NDArray, b: NDArray) -> Array:
     """Distances (A, B) of poses a (A, 7) and b (B, 7): largest difference in R and t.
 
