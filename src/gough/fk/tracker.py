@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from gough import quaternion, velocities
 from gough.checks import Array, as_number, as_whole
 from gough.errors import GoughError
-from gough.fk.solution import Solution
 from gough.fk.rows import Rows
+from gough.fk.solution import Solution
 from gough.fk.solve import Solver
 from gough.kernel import layout
 from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
