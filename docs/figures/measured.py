@@ -79,8 +79,10 @@ def _three_poses(axes: Axes) -> None:
     joints = gough.joint_positions(platform, modes.pose)
     base = platform.base
     order = np.argsort(gough.choose_mode(modes).rank)
-    above = [k for k in order if modes.pose.position[k, 2] > 0][:3]
-    for place, k in enumerate(above):
+    first, *pair = [k for k in order if modes.pose.position[k, 2] > 0][:3]
+    # mirror images of each other, of which rounding alone says which comes first
+    pair.sort(key=lambda k: modes.pose.position[k, 1])
+    for place, k in enumerate([first, *pair]):
         shift = np.array([place * 950.0, 0.0])
         color = BLUE if modes.sign[k] > 0 else VERMILION
         foot, head = oblique(base) + shift, oblique(joints[k]) + shift

@@ -22,7 +22,6 @@ from gough.files.csv import CsvSink, CsvSource
 from gough.files.excel import EXCEL, open_sheet
 from gough.files.log_format import LogFormat, split_unit
 from gough.files.metadata import check_same, describe, pose_frame
-from gough.files.parquet import ParquetSink, ParquetSource
 from gough.files.plausible import check_plausible
 from gough.files.rows import Reading, Sink, Source
 from gough.files.stores import Place, written
@@ -219,6 +218,8 @@ def _open(path: Given, reading: Reading) -> Source:
     file, where = part.place.open(), str(part.place)
     try:
         if ending == ".parquet":
+            from gough.files.parquet import ParquetSource  # not for text: it takes long to import
+
             return ParquetSource(file, where, reading, part.start, part.stop, part.before)
         if Path(where).suffix.lower() in EXCEL:
             with file:
@@ -254,6 +255,8 @@ def open_sink(path: Out, metadata: Mapping[str, str]) -> Iterator[Sink]:
         if ending == ".csv":
             yield CsvSink(file)
             return
+        from gough.files.parquet import ParquetSink
+
         sink = ParquetSink(file, metadata)
         try:
             yield sink
