@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import multiprocessing
 import os
+import pickle
 import signal
+from itertools import pairwise
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import gough
 from gough.errors import GoughError
 from gough.files import Reading, solve_file
 from gough.jobs import Job, Made, Summary, Unit, finished, make, plan, run_job
+from gough.jobs.cut import line_ends
 
 from .conftest import ROWS, write
 
@@ -83,7 +91,7 @@ def test_rows_of_parts_are_named_as_in_the_whole_file(tmp_path, platform, readin
         job = Job.of("solve", platform, tmp_path / "poses", shard_rows=70)
         made = [make(job, unit) for unit in plan(job, [tmp_path / f"big.{ending}"])]
         notes = [note for one in made for note in one.notes]
-        assert [note for note in notes if f"{place}: leg_3" in note], notes
+        assert [note for note in notes if note.startswith(f"big.{ending}: {place}: leg_3")]
         assert sum(one.failures for one in made) == 1
 
 
@@ -261,3 +269,43 @@ def test_processes_write_the_same_bytes_and_one_that_dies_loses_nothing(
     assert sorted(names) == sorted(outputs(tmp_path / "one"))
     assert outputs(tmp_path / "two") == outputs(tmp_path / "one")
     assert not multiprocessing.active_children()
+
+
+@settings(max_examples=60)
+@given(
+    fields=st.lists(st.text(st.sampled_from('a,"\n ;1'), max_size=6), min_size=1, max_size=40),
+    rows=st.integers(1, 7),
+    chunk=st.integers(1, 50),
+)
+def test_text_is_cut_where_rows_end(fields, rows, chunk):
+    """Against Python's own reader of CSV: each part holds `rows` of its rows."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows([number, field] for number, field in enumerate(fields))
+    data = text.getvalue().encode()
+    with mock.patch("gough.jobs.cut.CHUNK", chunk):
+        cuts = [(0, 0), *line_ends(io.BytesIO(data), rows)]
+    for (start, lines), (stop, _) in pairwise([*cuts, (len(data), 0)]):
+        part = data[start:stop].decode()
+        assert lines == data[:start].count(b"\n")
+        found = [int(row[0]) for row in csv.reader(io.StringIO(part, newline=""))]
+        first = rows * cuts.index((start, lines))
+        assert found == [*range(first, min(first + rows, len(fields)))]
+
+
+def test_a_job_can_be_sent_and_its_platform_is_the_same(platform):
+    job = Job.of("solve", platform, "poses", reading=KEEP, seed="home", follow={"max_turn": 0.1})
+    sent = pickle.loads(pickle.dumps(job))
+    assert (sent, sent.facts, sent.machine) == (job, job.facts, platform)
+    assert job.machine.digest == platform.digest
+
+
+def test_a_network_that_changed_is_another_job(tmp_path, platform, monkeypatch):
+    from importlib.resources import files
+
+    network = files("gough").joinpath("weights", "reference-disgnet.onnx")
+    monkeypatch.chdir(tmp_path)
+    Path("mine.onnx").write_bytes(network.read_bytes())
+    job = Job.of("solve", platform, "poses", seed="mine.onnx")
+    assert job.facts["seed"].startswith("network ")
+    assert job.options["seed"] == str(tmp_path / "mine.onnx")

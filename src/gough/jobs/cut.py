@@ -70,7 +70,7 @@ def _lines(job: Job, place: Place, size: int) -> Parts:
         if source.total is None:  # UTF-16
             return []
     with closing(place.open()) as file:
-        cuts = [(0, 0), *_line_ends(file, job.shard_rows)]
+        cuts = [(0, 0), *line_ends(file, job.shard_rows)]
         file.seek(max(cuts[-1][0], size - TAIL))
         if not file.read().strip():  # nothing but blank lines after the last cut
             cuts.pop()
@@ -81,7 +81,7 @@ def _lines(job: Job, place: Place, size: int) -> Parts:
     ]
 
 
-def _line_ends(file: BinaryIO, rows: int) -> Iterator[tuple[int, int]]:
+def line_ends(file: BinaryIO, rows: int) -> Iterator[tuple[int, int]]:
     """Bytes and lines up to the end of every `rows`-th row, which is outside quotation marks."""
     place, lines, quotes, found = 0, 0, 0, 0
     while data := file.read(CHUNK):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -26,6 +27,7 @@ from gough.jobs.summary import Summary
 from gough.whole_file import remove_left_behind
 
 Engine = Callable[..., Generator[Made, None, None]]
+log = logging.getLogger("gough")
 NAMED = 5  # differing outputs that an error lists
 
 
@@ -55,6 +57,12 @@ def run_job(
 
     Raises:
         GoughError: nothing to read, a folder that cannot be written, outputs of another job there.
+
+    Example:
+        >>> job = Job.of("solve", platform, "poses/", seed="home")
+        >>> summary = run_job(job, ["logs/"])
+        >>> summary.made, summary.skipped, summary.rows
+        (4, 0, 4000)
     """
     began = time.perf_counter()
     run = find_engine(engine)
@@ -85,7 +93,10 @@ def run_job(
     finally:
         _tidy(job, units)  # after workers that died
         summary.seconds = time.perf_counter() - began
-        write_json(job.out / f"{FOLDER}/report.json", summary.facts())
+        try:
+            write_json(job.out / f"{FOLDER}/report.json", summary.facts())
+        except GoughError as error:  # a disk that is full: the summary is returned all the same
+            log.warning("%s", error)
     return summary
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from gough.jobs.job import Job, Made
 from gough.status import InverseStatus, ModesStatus, Outcome, Status
 
+MOST_NOTES = 1_000
 OUTCOMES: dict[str, type[Outcome]] = {
     "solve": Status,
     "inverse": InverseStatus,
@@ -26,7 +27,7 @@ class Summary:
         failed: input and reason of each output that could not be made.
         counts: rows by the label of their status.
         unusable: rows without a usable result.
-        notes: what a user should know of inputs, and of how many.
+        notes: what a user should know of inputs, and of how many; the first thousand.
         seconds: time taken by this run.
         rows_made: rows of the outputs made by this run.
         skipped_bytes: size of the inputs whose outputs were there.
@@ -56,10 +57,9 @@ class Summary:
         self.unusable += made.failures
         for label, count in made.counts.items():
             self.counts[label] = self.counts.get(label, 0) + count
-        for note in made.notes:
-            # the same words about another file are one note
-            text = note.removeprefix(f"{made.unit.source}: ")
-            self.notes[text] = self.notes.get(text, 0) + 1
+        for text in made.notes:
+            if text in self.notes or len(self.notes) < MOST_NOTES:
+                self.notes[text] = self.notes.get(text, 0) + 1
 
     @property
     def rows(self) -> int:

@@ -64,7 +64,8 @@ def make(job: Job, unit: Unit, progress: Progress | None = None, threads: int = 
             text = printable(without_credentials(text))
             return Made(unit, error=text, seconds=time.perf_counter() - began)
     counts, failures = _counts(job, reports[0])
-    notes += [f"{unit.source}: {text}" for text in reports[0].invalid + reports[0].unlikely]
+    notes = [text.removeprefix(f"{unit.source}: ") for text in notes]  # alike for many files
+    notes += [f"{unit.input}: {text}" for text in reports[0].invalid + reports[0].unlikely]
     notes = [printable(without_credentials(text)) for text in notes[:MOST_NOTES]]
     seconds = time.perf_counter() - began
     return Made(unit, counts, failures, notes=tuple(notes), seconds=seconds)
