@@ -1,7 +1,7 @@
-"""Mistakes in data, by name: what a file that fits no machine would have to be read as to fit.
+"""Likely mistakes in measurements that fit no machine, such as another order of Euler angles.
 
-Each mistake is undone in turn, the instrument is placed on the drawing again, and the one that
-makes the file fit is named. Nothing is corrected silently.
+Each is undone in turn, the instrument is placed on the drawing again, and the one without which the
+measurements fit is named. Nothing is corrected silently.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from gough.calibration.sensors import (
 )
 from gough.pose import Pose
 
-LOOKED_AT = 40  # poses that mistakes are sought in
+LOOKED_AT = 40  # poses used in the search
 ENOUGH = 6  # iterations with which data that fit are placed
 FAR = 9.0  # squared distance per number from which the fit on the drawing is called impossible
 CLEARER = 30.0  # times smaller a squared distance must be for a mistake to be named

@@ -22,7 +22,7 @@ from gough.calibration.residuals import Rigid
 from gough.calibration.sensors import PoseSensor
 from gough.errors import PlatformError
 
-STARTS = 80  # poses that a start is sought with
+STARTS = 80  # poses used to find a start
 SUBSETS, SUBSET = 8, 8  # random draws of poses for a robust start, and poses in each
 CUT = 3.54  # [sigma of a normal number] distance from which a pose is an outlier: 1 of 5000
 
@@ -83,7 +83,7 @@ def polish_start(problem: Problem, state: State) -> State:
 
 
 def plain_fit(problem: Problem, start: State) -> Estimate:
-    """Fit all poses alike, most of the way with some of them where there are many."""
+    """Fit all poses with equal weights; where there are many, first with a part of them."""
     if len(problem) > 2 * STARTS:
         some = np.linspace(0, len(problem) - 1, STARTS).astype(int)
         first = minimise(problem[some], replace(start, near=start.near[some])).state

@@ -23,7 +23,7 @@ PLAUSIBLE = (0.01, 50.0)  # sizes of machines [m]
 USUAL = 10.0  # [m] most machines are smaller
 EQUAL = 0.02  # relative spread of the legs at home up to which they are meant to be equal
 BETTER = 0.05  # share of a spread that another numbering must leave, to be suggested
-CLOSE = 0.05  # distance to a singularity that is worth a word
+CLOSE = 0.05  # distance to a singularity below which a remark is made
 TURN_SPREAD = 0.5  # of the motors' axes from the vertical, up to which their sense is compared
 
 
@@ -100,7 +100,7 @@ def _senses(platform: Platform) -> Found:
 
 
 def _sense(points: Array) -> int:
-    """Turns that points go round their centre, seen from +z: +1 counter-clockwise, -1 clockwise."""
+    """Turns of points about their centre, seen from +z: +1 counter-clockwise, -1 clockwise."""
     x, y = (points - points.mean(axis=0))[:, :2].T
     angles = np.arctan2(y, x)
     steps = np.diff(np.append(angles, angles[0]))

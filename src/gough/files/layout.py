@@ -260,7 +260,7 @@ def _split(text: str, delimiter: str) -> list[str]:
 
 
 def _fields(line: bytes, delimiter: str) -> list[str]:
-    """Fields of a line, none where its quotation marks are out of order."""
+    """Fields of a line; none where a quotation mark has no partner."""
     try:
         return _split(_text(line), delimiter)
     except csv.Error:

@@ -23,7 +23,7 @@ TOGETHER = 3e-6  # distance of refined poses that are one multiple solution
 CURVE_STEP = 0.02  # between the points of a curve of poses
 CURVE_POINTS = 3000  # at most
 SAMPLES = 36  # poses that stand for a curve in an answer
-TRIES = 50  # starting poses from which a pose of an architecturally singular machine is sought
+TRIES = 50  # starting poses for finding a pose of an architecturally singular machine
 
 
 @dataclass(frozen=True, eq=False)

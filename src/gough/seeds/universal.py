@@ -108,7 +108,7 @@ class UniversalSeed:
     def _corrected(self, struts: HomeStruts, terms: Array) -> Array:
         """Strut length changes whose linear guess is the network's pose, (M, 6, N).
 
-        Each reading of a rotary platform is a machine of its own. The network reads the one at
+        Each reading of a rotary platform makes another machine. The network reads the one at
         home for all of them, which costs a tenth, and each its own where that guess is far off.
         """
         if self.platform.rotary is None:
