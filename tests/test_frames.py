@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import machines
@@ -152,6 +153,143 @@ def test_the_covariance_is_that_of_the_frame() -> None:
     assert found.covariance is not None
     scale = np.sqrt(np.outer(np.diag(sample), np.diag(sample)))
     np.testing.assert_allclose(found.covariance / scale, sample / scale, atol=0.04)
+
+
+def in_frame(seed: int) -> tuple[Platform, Pose, np.ndarray]:
+    """A platform with frames, a pose of "tip in room", and twists about as large as the machine."""
+    platform, poses = machine(seed)
+    near = {n: Pose(0.2 * platform.size * p.position, p.wxyz) for n, p in poses.items()}
+    platform = replace(platform, frames=Frames(near))
+    pose = platform.frame("tip in room").of(support.sample(platform, (), seed))
+    twists = np.random.default_rng(seed).uniform(-1, 1, (2, 6))
+    return platform, pose, twists * np.repeat([platform.size, 1.0], 3)
+
+
+@support.at_most(20)
+@given(support.seeds)
+def test_rates_and_accelerations_of_a_frame_are_the_derivatives_of_readings(seed: int) -> None:
+    platform, pose, (twist, acceleration) = in_frame(seed)
+    rates = gough.leg_rates(platform, pose, twist, "tip in room")
+    second = gough.leg_accelerations(platform, pose, twist, acceleration, "tip in room")
+    h = 3e-3
+    at = [support.moved(pose, s * twist + s**2 / 2 * acceleration) for s in h * np.arange(-2, 3)]
+    legs = np.array([gough.leg_lengths(platform, p, "tip in room") for p in at])
+    scale = support.reading_scale(platform)
+    first = np.array([1, -8, 0, 8, -1]) @ legs / (12 * h)
+    np.testing.assert_allclose(rates, first, rtol=1e-6, atol=1e-6 * scale)
+    twice = np.array([-1, 16, -30, 16, -1]) @ legs / (12 * h**2)
+    np.testing.assert_allclose(second, twice, rtol=1e-4, atol=1e-4 * scale)
+
+
+@support.at_most(20)
+@given(support.seeds)
+def test_forces_and_twists_of_a_frame_have_the_same_power(seed: int) -> None:
+    platform, pose, (twist, load) = in_frame(seed)
+    load = load / platform.size * np.repeat([1.0, platform.size**2], 3)
+    frame = "tip in room"
+    rates = gough.leg_rates(platform, pose, twist, frame)
+    forces = gough.leg_forces(platform, pose, load, frame)
+    power = np.abs(forces) @ np.abs(rates)
+    np.testing.assert_allclose(forces @ rates, load @ twist, rtol=1e-9, atol=1e-12 * power)
+    units = np.repeat([1.0, platform.size], 3)
+    back = gough.wrench(platform, pose, forces, frame) / units
+    np.testing.assert_allclose(back, load / units, rtol=1e-7, atol=1e-9)
+    again = gough.twist(platform, pose, rates, frame) * units[::-1]
+    np.testing.assert_allclose(again, twist * units[::-1], rtol=1e-7, atol=1e-9 * platform.size)
+
+
+@support.at_most(20)
+@given(support.seeds)
+def test_what_the_jacobian_gives_is_carried_by_the_twists_of_the_frame(seed: int) -> None:
+    platform, pose, _ = in_frame(seed)
+    view, frame = platform.frame("tip in room"), "tip in room"
+    own, M = view.platform_pose(pose), view.twist_matrix(view.platform_pose(pose))
+    inverse = np.linalg.inv(M)
+    unit = np.repeat([1.0, platform.size], 3)
+    pairs = [
+        (gough.stiffness(platform, pose, 1.0, frame), unit,
+         inverse.T @ gough.stiffness(platform, own, 1.0) @ inverse),
+        (gough.pose_covariance(platform, pose, 1.0, frame), 1 / unit,
+         M @ gough.pose_covariance(platform, own, 1.0) @ M.T),
+    ]  # fmt: skip
+    for found, unit, expected in pairs:
+        scale = np.outer(1 / unit, 1 / unit)
+        most = np.max(np.abs(expected * scale))
+        np.testing.assert_allclose(found * scale, expected * scale, rtol=0, atol=1e-10 * most)
+
+
+@support.at_most(5)
+@given(support.seeds)
+def test_reach_moves_along_and_about_the_axes_of_the_frame(seed: int) -> None:
+    limits = gough.MachineLimits(base_joint_cone=25, leg_radius=8, clearance=2)
+    rng = np.random.default_rng(seed)
+    frames = {"tool_in_platform": Pose([10, -20, 90], rng.normal(size=4)),
+              "work_in_world": Pose([100, 50, 700], rng.normal(size=4))}  # fmt: skip
+    platform = replace(Platform.load("reference").with_workspace(60, 20), limits=limits)
+    platform = platform.with_frames(frames)
+    pose = platform.frame(TOOL).of(platform.sample_poses(1, seed)[0])
+    np.testing.assert_array_equal(
+        gough.limits(platform, pose, frame=TOOL).margin,
+        gough.limits(platform, platform.frame(TOOL).platform_pose(pose)).margin,
+    )
+    found, inside = (
+        gough.reach(platform, pose, frame=TOOL),
+        gough.limits(platform, pose, frame=TOOL),
+    )
+    if not inside.ok:
+        return
+    for axis in range(6):
+        for way, sign in enumerate((-1, 1)):
+            distance = found.distance[axis, way]
+            steps = np.append(np.linspace(0, 1 - 1e-9, 50) * distance, distance * (1 + 1e-6) + 1e-7)
+            twists = np.zeros((51, 6))
+            twists[:, axis] = sign * steps
+            ok = gough.limits(platform, support.moved(pose, twists), frame=TOOL).ok
+            assert ok[:-1].all()
+            assert not ok[-1] or not found.limit[axis, way]
+
+
+def test_a_tracker_returns_poses_and_twists_of_the_frame() -> None:
+    view, home = MACHINE.frame(TOOL), MACHINE.home
+    path = Pose(home.position + np.linspace(0, 1e-3, 5)[:, None] * [1, -2, 3], home.wxyz)
+    legs = gough.leg_lengths(MACHINE, path)
+    tracker = gough.Tracker(MACHINE, start=view.of(home), frame=TOOL)
+    own = gough.Tracker(MACHINE, start=home)
+    assert tracker.frame == TOOL
+    kept = tracker.pose
+    for row in legs:
+        support.assert_same_pose(tracker.update(row), view.of(own.update(row)), 1e-12)
+        assert tracker.pose is kept
+    carried = view.twist_matrix(own.pose) @ own.twist
+    np.testing.assert_allclose(tracker.twist, carried, atol=1e-9)
+    rates = gough.leg_rates(MACHINE, own.pose, [1e-3, 2e-3, 0, 0, 0, 0.01])
+    for one in (tracker, own):
+        one.update(legs[-1], rates)
+    carried = view.twist_matrix(own.pose) @ own.twist
+    np.testing.assert_allclose(tracker.twist, carried, atol=1e-12)
+    found = gough.solve(MACHINE, legs, follow=True, frame=TOOL, limits=True, leg_noise=1e-6)
+    plain = gough.solve(MACHINE, legs, follow=True, limits=True, leg_noise=1e-6)
+    assert found.frame == TOOL
+    support.assert_same_pose(found.pose, view.of(plain.pose), 1e-12)
+    assert found.limits is not None
+    assert plain.limits is not None
+    np.testing.assert_array_equal(found.limits.margin, plain.limits.margin)
+
+
+def test_modes_are_those_of_the_frame() -> None:
+    reference = Platform.load("reference").with_frames(
+        {"tool_in_platform": [0, 0, 90], "work_in_world": Pose.from_euler([0, 0, 600], [0.1, 0, 0])}
+    )
+    modes = gough.assembly_modes(reference, reference.home_legs, frame=TOOL)
+    support.assert_same_pose(modes.pose, reference.frame(TOOL).of(modes.platform_pose), 1e-12)
+    assert modes.frame == TOOL
+    assert modes.residual.max() < 1e-11
+    home = reference.frame(TOOL).of(reference.home)
+    choice = gough.choose_mode(modes, near=home, max_shift=1.0)
+    assert choice.count == 1
+    support.assert_same_pose(modes.pose[choice.best][0], home, 1e-9)
+    with pytest.raises(GoughError, match="did you mean 'tool'"):
+        gough.assembly_modes(reference, reference.home_legs, frame="tol in work")
 
 
 def test_parquet_states_the_frame_of_its_poses(tmp_path: Path) -> None:

@@ -9,16 +9,33 @@ from gough.errors import GoughError, InputError, suggestion
 
 LEGS = tuple(f"leg_{i}" for i in range(1, 7))
 POSITION = ("x", "y", "z")
+MAKERS_POSITION = ("X", "Y", "Z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 EULER = ("rx", "ry", "rz")  # [rad], R = Rx Ry Rz
 EULER_DEG = ("rx_deg", "ry_deg", "rz_deg")
-ROTATIONS = (QUATERNION, EULER, EULER_DEG)
-ROTATION_TEXT = "qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg"
+PI_UVW = ("U", "V", "W")  # [deg], R = Rx Ry Rz: about axes that turn along
+LINUXCNC_ABC = ("A", "B", "C")  # [deg], R = Rz Ry Rx: about axes at rest, x first
+ROS_RPY = ("roll", "pitch", "yaw")  # [rad], as A, B, C
+ROTATIONS = (QUATERNION, EULER, EULER_DEG, PI_UVW, LINUXCNC_ABC, ROS_RPY)
+IN_DEGREES = (EULER_DEG, PI_UVW, LINUXCNC_ABC)
+AXES_AT_REST = (LINUXCNC_ABC, ROS_RPY)
+ROTATION_TEXT = (
+    "qw, qx, qy, qz | rx, ry, rz [rad] | rx_deg, ry_deg, rz_deg | U, V, W | A, B, C | roll, pitch, "
+    "yaw [rad]"
+)
 STATUS, RESIDUAL, ITERATIONS, RADIUS = "status", "residual", "iterations", "radius"
 EVENT = "event"
 MARGIN, LIMIT = "margin", "limit"  # of the tightest limit
 DEVIATIONS = ("std_x", "std_y", "std_z", "std_rx", "std_ry", "std_rz")
-Angles = Literal["deg", "rad"]
+Angles = Literal["deg", "rad", "uvw", "abc", "rpy"]
+WRITTEN: dict[Angles | None, tuple[str, ...]] = {
+    None: POSITION + QUATERNION,
+    "deg": POSITION + EULER_DEG,
+    "rad": POSITION + EULER,
+    "uvw": MAKERS_POSITION + PI_UVW,
+    "abc": MAKERS_POSITION + LINUXCNC_ABC,
+    "rpy": POSITION + ROS_RPY,
+}
 
 
 def leg_columns(where: str, found: Sequence[str], *, cure: str = "") -> tuple[str, ...]:
@@ -48,22 +65,28 @@ def file_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
 
 
 def pose_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
-    """Position and rotation columns: the first complete set of qw.., rx.., rx_deg.. columns.
+    """Position and rotation columns: the first complete set of `ROTATIONS`.
 
     Raises:
         InputError: some are missing or occur twice; the message lists those found.
     """
-    missing = [name for name in POSITION if name not in found]
-    if missing:
+    position = position_columns(found)
+    if position is None:
+        missing = [name for name in POSITION if name not in found]
         raise InputError(
             f"{where}: no column {', '.join(missing)}; expected x, y, z and one of "
             f"{ROTATION_TEXT}; found {_list(found)}; {_rename(missing, found)}"
         )
-    return (*checked(where, found, POSITION), *rotation_columns(where, found))
+    return (*checked(where, found, position), *rotation_columns(where, found))
+
+
+def position_columns(found: Sequence[str]) -> tuple[str, ...] | None:
+    """x, y, z, or else X, Y, Z, if all three are in `found`."""
+    return next((p for p in (POSITION, MAKERS_POSITION) if all(n in found for n in p)), None)
 
 
 def rotation_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
-    """Rotation columns: the first complete set of qw.., rx.., rx_deg.. columns.
+    """Rotation columns: the first complete set of `ROTATIONS`.
 
     Raises:
         InputError: none is complete, or a column occurs twice; the message lists those found.
@@ -84,7 +107,7 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
         InputError: some are missing or occur twice; the message lists those found.
     """
     has_legs = any(name in found for name in LEGS)
-    if not has_legs and not any(name in found for name in POSITION):
+    if not has_legs and not any(n in found for n in POSITION + MAKERS_POSITION):
         raise InputError(
             f"{where}: holds neither legs nor poses; expected columns leg_1 to leg_6, or x, y, z "
             f"and one of {ROTATION_TEXT}; found {_list(found)}"
@@ -98,19 +121,25 @@ def pose_or_leg_columns(where: str, found: Sequence[str]) -> tuple[str, ...]:
 
 
 def pose_names(angles: Angles | None) -> tuple[str, ...]:
-    """The columns of a written pose: with Euler angles in these units, or with a quaternion.
+    """The columns of a written pose: with Euler angles in this form, or with a quaternion.
 
     Raises:
         GoughError: angles of another name.
     """
-    if angles not in (None, "deg", "rad"):
-        raise GoughError(f"angles: expected 'deg' or 'rad', found {angles!r}")
-    return POSITION + {None: QUATERNION, "deg": EULER_DEG, "rad": EULER}[angles]
+    if angles not in WRITTEN:
+        known = ", ".join(repr(name) for name in WRITTEN if name)
+        raise GoughError(f"angles: expected one of {known}, found {angles!r}")
+    return WRITTEN[angles]
+
+
+def in_degrees(angles: Angles | None) -> bool:
+    """True for angles that are written in degrees."""
+    return pose_names(angles)[3:] in IN_DEGREES
 
 
 def deviation_names(angles: Angles | None) -> tuple[str, ...]:
-    """The columns of standard deviations of a pose, of angles in degrees for "deg", else in rad."""
-    ending = "_deg" if angles == "deg" else ""
+    """The columns of standard deviations of a pose, of angles in their unit, else in rad."""
+    ending = "_deg" if in_degrees(angles) else ""
     return DEVIATIONS[:3] + tuple(name + ending for name in DEVIATIONS[3:])
 
 
@@ -159,7 +188,7 @@ def _rename(missing: Sequence[str], found: Sequence[str]) -> str:
     """The advice for missing columns; it names the one most like the first of them."""
     from difflib import get_close_matches
 
-    known = {name for names in (LEGS, POSITION, *ROTATIONS) for name in names}
+    known = {name for names in (LEGS, POSITION, MAKERS_POSITION, *ROTATIONS) for name in names}
     others = {name.strip().lower(): name for name in reversed(found) if name not in known}
     for name in missing:
         near = get_close_matches(name, others, n=1, cutoff=0.7)

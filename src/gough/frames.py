@@ -94,11 +94,13 @@ class FramePose:
         pivot: (3,) of the platform [platform unit].
         before: pose of the base in the frame at rest.
         after: pose of the moving frame in the platform.
+        name: such as "tool in work".
     """
 
     pivot: Array
     before: Pose
     after: Pose
+    name: str
 
     @property
     def digest(self) -> str:
@@ -114,6 +116,19 @@ class FramePose:
         """Poses (...) of the platform, from those of the frame: inverse of `of`."""
         return about_origin(self.before.inverse() @ pose @ self.after.inverse(), -self.pivot)
 
+    def lever(self, pose: Pose) -> Array:
+        """Vectors (..., 3) from the pivot to the moving frame's origin, in base coordinates.
+
+        Args:
+            pose: poses (...) of the platform.
+        """
+        return pose.rotation @ (self.after.position - self.pivot)
+
+    def in_base(self, vectors: Array) -> Array:
+        """Pairs of vectors (..., 6) in base coordinates, from those of the frame at rest."""
+        pairs = vectors.reshape(*vectors.shape[:-1], 2, 3) @ self.before.rotation
+        return pairs.reshape(vectors.shape)
+
     def twist_matrix(self, pose: Pose) -> Array:
         """Matrices (..., 6, 6) from twists of the platform's poses to twists of the frame's.
 
@@ -124,7 +139,7 @@ class FramePose:
         Args:
             pose: poses (...) of the platform.
         """
-        lever = pose.rotation @ (self.after.position - self.pivot)
+        lever = self.lever(pose)
         rotation = self.before.rotation
         out = np.zeros((*pose.batch, 6, 6))
         out[..., :3, :3] = out[..., 3:, 3:] = rotation
@@ -156,7 +171,8 @@ def frame_pose(frames: Frames, pivot: Array, name: str) -> FramePose:
                 f"frame: expected a name such as 'tool in work', found {name!r}"
                 f"{suggestion(frame, known)} frames that {kind} are {', '.join(known)}"
             )
-    return FramePose(pivot, frames.at_rest[at_rest].inverse(), frames.moving[moving])
+    before, after = frames.at_rest[at_rest].inverse(), frames.moving[moving]
+    return FramePose(pivot, before, after, name)
 
 
 def one_pose(name: str, value: Pose | ArrayLike) -> Pose:

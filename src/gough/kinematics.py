@@ -60,12 +60,18 @@ def leg_lengths(platform: Platform, pose: Pose | Table, frame: str | None = None
         >>> gough.leg_lengths(platform, platform.home).shape
         (6,)
     """
-    poses = as_pose(pose)
     with np.errstate(over="ignore", invalid="ignore"):  # poses out of reach, and far beyond it
-        if frame is not None:
-            poses = platform.frame(frame).platform_pose(poses)
-        vectors = strut_vectors(platform, poses)
+        vectors = strut_vectors(platform, platform_pose(platform, as_pose(pose), frame))
         return struts.readings(vectors, platform.true_at_zero, platform.gain, platform.rotary)
+
+
+def platform_pose(platform: Platform, pose: Pose, frame: str | None) -> Pose:
+    """Poses (...) of the platform, from those of a frame such as "tool in work" if one is named.
+
+    Raises:
+        GoughError: an unknown frame.
+    """
+    return pose if frame is None else platform.frame(frame).platform_pose(pose)
 
 
 def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Array, Array]:
@@ -81,7 +87,7 @@ def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Arra
     return struts.equivalent(platform.base, zero, gain, platform.rotary, as_readings(legs))
 
 
-def jacobian(platform: Platform, pose: Pose) -> Array:
+def jacobian(platform: Platform, pose: Pose, frame: str | None = None) -> Array:
     """Jacobian d readings / d twist, (..., 6, 6).
 
     The twist is (velocity of the pose's position, angular velocity), both in base
@@ -90,16 +96,32 @@ def jacobian(platform: Platform, pose: Pose) -> Array:
 
     Source: Merlet, Parallel Robots, 2nd ed., sec. 5.1.
 
+    Args:
+        pose: batch axes (...).
+        frame: whose poses and twists these are, such as "tool in work" (see `Platform.frame`):
+            the velocity is then that of the moving frame's origin, in coordinates of the frame at
+            rest. Those of the platform unless given.
+
+    Raises:
+        GoughError: an unknown frame.
+
     Example:
         >>> import gough
         >>> platform = gough.Platform.load("reference")
         >>> gough.jacobian(platform, platform.sample_poses(5)).shape
         (5, 6, 6)
     """
+    own = platform_pose(platform, pose, frame)
     rods, rates = struts.rods_and_rates(
-        strut_vectors(platform, pose), platform.gain, platform.rotary
+        strut_vectors(platform, own), platform.gain, platform.rotary
     )
-    rows = np.concatenate([rods, np.cross(_levers(platform, pose), rods)], axis=-1)
+    levers = _levers(platform, own)
+    if frame is not None:
+        view = platform.frame(frame)
+        turn = view.before.rotation  # of all vectors to coordinates of the frame at rest
+        levers = (levers - view.lever(own)[..., None, :]) @ turn.T
+        rods = rods @ turn.T
+    rows = np.concatenate([rods, np.cross(levers, rods)], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return rows / rates[..., None]
 
@@ -161,7 +183,9 @@ def joint_radius(platform: Platform) -> float:
     return float(np.sqrt(np.mean(np.sum(offsets**2, axis=-1))))
 
 
-def pose_covariance(platform: Platform, pose: Pose, leg_noise: ArrayLike) -> Array:
+def pose_covariance(
+    platform: Platform, pose: Pose, leg_noise: ArrayLike, frame: str | None = None
+) -> Array:
     """Covariance of the pose that noise of the leg readings causes, (..., 6, 6).
 
     To first order, C_pose = J^-1 C_legs J^-T, in the twist coordinates of `jacobian`:
@@ -170,15 +194,16 @@ def pose_covariance(platform: Platform, pose: Pose, leg_noise: ArrayLike) -> Arr
     Args:
         leg_noise: standard deviation of every reading (a number) or of each (6,), or the
             covariance (6, 6) of the readings.
+        frame: whose poses these are, and whose covariance is returned; as in `jacobian`.
 
     Returns:
         (..., 6, 6); NaN where the pose is singular.
 
     Raises:
-        GoughError: noise of another shape, negative or not finite.
+        GoughError: noise of another shape, negative or not finite, or an unknown frame.
     """
     covariance = _leg_covariance(leg_noise)
-    J = jacobian(platform, pose)
+    J = jacobian(platform, pose, frame)
     rows, known = _finite_rows(J)
     regular = (known & (np.linalg.det(rows) != 0))[..., None, None]
     inverse = np.linalg.inv(np.where(regular, J, np.eye(6)))

@@ -14,6 +14,7 @@ from gough.kernel.limit_constants import KINDS, LABELS, NAMES, NO_PART, STATED, 
 from gough.kernel.margins import SLOTS, margin_rows
 from gough.kernel.reach import reach_rows
 from gough.kernel.threads import in_parts
+from gough.kinematics import platform_pose
 from gough.platform import Platform
 from gough.pose import Pose, as_pose
 from gough.tables import Table
@@ -101,7 +102,13 @@ class Limits:
         return f"Limits({self.limit}, {float(self.tightest):.3g} left)"
 
 
-def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None) -> Limits:
+def limits(
+    platform: Platform,
+    pose: Pose | Table,
+    *,
+    workers: int | None = None,
+    frame: str | None = None,
+) -> Limits:
     """Calculate how far poses are from every limit of their machine.
 
     Their margins, and where their share is 1:
@@ -121,13 +128,15 @@ def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None
     Args:
         pose: batch axes (...), or a table of N poses (see `Pose.from_frame`).
         workers: threads; as many as there are cores unless given.
+        frame: whose poses these are, such as "tool in work" (see `Platform.frame`); those of the
+            platform unless given.
 
     Returns:
         NaN throughout for poses of NaN. Where a motor cannot reach, only `arm` and `workspace`
         have a margin.
 
     Raises:
-        GoughError: neither poses nor a table, or a table with other columns.
+        GoughError: neither poses nor a table, a table with other columns, or an unknown frame.
 
     Example:
         >>> import gough
@@ -139,7 +148,7 @@ def limits(platform: Platform, pose: Pose | Table, *, workers: int | None = None
         >>> found.of("stroke").round(4)
         np.float64(0.0076)
     """
-    poses = as_pose(pose)
+    poses = platform_pose(platform, as_pose(pose), frame)
     constants = limit_constants(platform)
     kinds = np.flatnonzero(constants[STATED : STATED + KINDS])
     position, wxyz = flat_rows(poses)
@@ -187,11 +196,19 @@ class Reach:
         return "\n".join(["Reach(", *lines, ")"])
 
 
-def reach(platform: Platform, pose: Pose | Table, *, workers: int | None = None) -> Reach:
+def reach(
+    platform: Platform,
+    pose: Pose | Table,
+    *,
+    workers: int | None = None,
+    frame: str | None = None,
+) -> Reach:
     """Calculate how far each axis of a pose can still move, both ways, and which limit ends it.
 
     One axis moves at a time: the position along x, y or z of the base, or the rotation about one
-    of these directions through the pose's position. The limits are those of `limits`.
+    of these directions through the pose's position. With a frame such as "tool in work" it is the
+    tool that moves, along and about the axes of the work piece. The limits are those of `limits`;
+    the workspace stays the box of the platform's poses.
 
     Poses are tried in steps of a thousandth of the workspace's box along the axis (for rotations
     of its widest angle; without a workspace, of the platform's size and of half a turn), up to
@@ -202,9 +219,11 @@ def reach(platform: Platform, pose: Pose | Table, *, workers: int | None = None)
     Args:
         pose: batch axes (...), or a table of N poses (see `Pose.from_frame`).
         workers: threads; as many as there are cores unless given.
+        frame: whose poses and axes, such as "tool in work" (see `Platform.frame`); those of the
+            platform in the base unless given.
 
     Raises:
-        GoughError: neither poses nor a table, or a table with other columns.
+        GoughError: neither poses nor a table, a table with other columns, or an unknown frame.
 
     Example:
         >>> import gough
@@ -213,15 +232,21 @@ def reach(platform: Platform, pose: Pose | Table, *, workers: int | None = None)
         >>> found.distance[2].round(4), found.limit[2].tolist()
         (array([0.0131, 0.0131]), ['z: workspace', 'z: workspace'])
     """
-    poses = as_pose(pose)
+    poses = platform_pose(platform, as_pose(pose), frame)
     constants = limit_constants(platform)
     position, wxyz = flat_rows(poses)
+    axes, point = np.eye(3), np.zeros(3)
+    if frame is not None:
+        view = platform.frame(frame)
+        axes, point = view.before.rotation.copy(), view.after.position - view.pivot
     count = len(position)
     out = np.empty((count, 6, 2)), np.empty((count, 6, 2), np.uint8)
-    spans = _spans(platform)
+    spans = _spans(platform, axes)
 
     def part(first: int, last: int) -> int:
-        return reach_rows(constants, position, wxyz, first, last, spans, new_work(), out)
+        return reach_rows(
+            constants, position, wxyz, first, last, spans, axes, point, new_work(), out
+        )
 
     in_parts(part, count, workers, chunk=4, serial=1)
     return Reach(out[0].reshape(*poses.batch, 6, 2), out[1].reshape(*poses.batch, 6, 2))
@@ -251,13 +276,17 @@ def new_work() -> tuple[Array, ...]:
     return np.zeros(SLOTS), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6), np.zeros(6)
 
 
-def _spans(platform: Platform) -> Array:
-    """Step and longest way (6, 2) of each axis that `reach` tries [platform unit], [rad]."""
+def _spans(platform: Platform, axes: Array) -> Array:
+    """Step and longest way (6, 2) of each axis that `reach` tries [platform unit], [rad].
+
+    Args:
+        axes: (3, 3) directions of the axes in base coordinates, one a row.
+    """
     width = np.repeat([platform.size, np.pi], 3)
     longest = width.copy()
     if platform.workspace is not None:
         space = platform.workspace
-        width[:3] = longest[:3] = np.ptp(space.translation, axis=1)
+        width[:3] = longest[:3] = np.abs(axes) @ np.ptp(space.translation, axis=1)
         angles = np.radians(np.ptp(space.rotation_deg, axis=1))
         width[3:] = max(np.max(angles), 1e-3)
         longest[3:] = min(np.sum(angles), np.pi)  # no two rotations of the box are farther apart

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from gough import quaternion, tables
 from gough.checks import LARGEST, Array, as_batch
-from gough.columns import EULER_DEG, QUATERNION, Angles, pose_names
+from gough.columns import AXES_AT_REST, IN_DEGREES, QUATERNION, Angles, in_degrees, pose_names
 from gough.errors import GoughError
 from gough.tables import Kind, Table
 from gough.text import number, page, pose_heads, rows_of
@@ -146,8 +146,8 @@ class Pose:
         """Make poses from a pandas, polars, pyarrow or other Arrow table, batch (N,).
 
         Columns x, y, z and qw, qx, qy, qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg
-        (R = Rx Ry Rz); others are ignored. Rows with absent values, or whose quaternion's length
-        is off by more than 0.001, are NaN throughout.
+        (R = Rx Ry Rz), or as makers write them (see `to_frame`); others are ignored. Rows with
+        absent values, or whose quaternion's length is off by more than 0.001, are NaN throughout.
 
         Raises:
             GoughError: no table. InputError: other columns, or no numbers in them.
@@ -243,8 +243,10 @@ class Pose:
 
         Args:
             kind: "pandas", "polars" or "pyarrow"; pandas unless given.
-            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz),
-                instead of the quaternion.
+            angles: instead of the quaternion Euler angles: "deg" or "rad" (rx_deg to rz_deg or rx
+                to rz, R = Rx Ry Rz), or as makers write them: "uvw" (PI: U, V, W [deg], R = Rx Ry
+                Rz), "abc" (LinuxCNC: A, B, C [deg], R = Rz Ry Rx) or "rpy" (ROS: roll, pitch, yaw
+                [rad], R = Rz Ry Rx).
 
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
@@ -364,13 +366,16 @@ def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Calla
     position, turn = clean[:, :3], clean[:, 3:]
     if rotation == QUATERNION:
         return Pose(position, turn), reason
-    return Pose.from_euler(position, np.radians(turn) if rotation == EULER_DEG else turn), reason
+    turn = np.radians(turn) if rotation in IN_DEGREES else turn
+    make = Pose.from_rpy if rotation in AXES_AT_REST else Pose.from_euler
+    return make(position, turn), reason
 
 
 def pose_values(pose: Pose, angles: Angles | None) -> Array:
     """Values of the columns `pose_names(angles)`, (..., 7) or (..., 6)."""
-    rotation = pose.wxyz if angles is None else pose.euler
-    if angles == "deg":
+    names = pose_names(angles)[3:]
+    rotation = pose.rpy if names in AXES_AT_REST else pose.euler if angles else pose.wxyz
+    if in_degrees(angles):
         rotation = np.degrees(rotation)
     return np.concatenate([pose.position, rotation], axis=-1)
 

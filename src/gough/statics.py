@@ -31,7 +31,9 @@ SAMPLES = 4096  # poses of the workspace from which the search for forces starts
 HALVINGS = 40  # of the search's steps, the first of which is half the box
 
 
-def stiffness(platform: Platform, pose: Pose, leg_stiffness: ArrayLike) -> Array:
+def stiffness(
+    platform: Platform, pose: Pose, leg_stiffness: ArrayLike, frame: str | None = None
+) -> Array:
     """Stiffness of the platform from that of its legs, (..., 6, 6).
 
     It maps a small displacement (translation of the pose's position, rotation vector, both in base
@@ -42,6 +44,7 @@ def stiffness(platform: Platform, pose: Pose, leg_stiffness: ArrayLike) -> Array
         pose: batch axes (...).
         leg_stiffness: force per change of length of every leg (a number) or of each (6,) [force /
             platform unit]; of rotary legs torque per motor angle [force x platform unit / rad].
+        frame: whose poses and axes, such as "tool in work", as in `gough.jacobian`.
 
     Returns:
         Blocks [force / platform unit], [force / rad], [force] and [force x platform unit / rad].
@@ -57,12 +60,14 @@ def stiffness(platform: Platform, pose: Pose, leg_stiffness: ArrayLike) -> Array
         np.float64(5026.3)
     """
     springs = _per_leg("leg_stiffness", leg_stiffness)
-    A = _leg_jacobian(platform, pose)
+    A = _leg_jacobian(platform, pose, frame)
     with np.errstate(invalid="ignore"):  # infinite rows, where arm and rod align
         return np.swapaxes(A, -1, -2) @ (springs[:, None] * A)
 
 
-def softest_stiffness(platform: Platform, pose: Pose, leg_stiffness: ArrayLike) -> Array:
+def softest_stiffness(
+    platform: Platform, pose: Pose, leg_stiffness: ArrayLike, frame: str | None = None
+) -> Array:
     """Stiffness (...) against forces in the direction in which the platform gives way most.
 
     A force F at the pose's position, in any direction, moves it by at most F / this, rotation
@@ -71,6 +76,7 @@ def softest_stiffness(platform: Platform, pose: Pose, leg_stiffness: ArrayLike) 
     Args:
         pose: batch axes (...).
         leg_stiffness: as in `stiffness`.
+        frame: whose poses and axes, such as "tool in work", as in `gough.jacobian`.
 
     Returns:
         [force / platform unit]; 0 at a singular pose, NaN where a motor cannot reach.
@@ -83,14 +89,19 @@ def softest_stiffness(platform: Platform, pose: Pose, leg_stiffness: ArrayLike) 
     """
     springs = _per_leg("leg_stiffness", leg_stiffness)
     units = np.repeat([1.0, 1 / platform.size], 3)
-    A = _leg_jacobian(platform, pose) * units  # all columns in the unit of the first
+    A = _leg_jacobian(platform, pose, frame) * units  # all columns in the unit of the first
     inverse, regular, known = _inverse(A)
     moved = inverse[..., :3, :] / np.sqrt(springs)
     largest = np.linalg.svd(moved, compute_uv=False)[..., 0]
     return np.where(known, np.where(regular, 1 / largest**2, 0.0), np.nan)[()]
 
 
-def axis_speeds(platform: Platform, pose: Pose, leg_speed: ArrayLike | None = None) -> Array:
+def axis_speeds(
+    platform: Platform,
+    pose: Pose,
+    leg_speed: ArrayLike | None = None,
+    frame: str | None = None,
+) -> Array:
     """Largest speed of each axis on its own that the speeds of the legs allow, (..., 6).
 
     The accelerations of the axes from rest follow from those of the legs in the same way.
@@ -99,6 +110,7 @@ def axis_speeds(platform: Platform, pose: Pose, leg_speed: ArrayLike | None = No
         pose: batch axes (...).
         leg_speed: largest speed of every leg (a number) or of each (6,) [platform unit / s], of
             motors [rad / s]; that of `platform.limits` unless given.
+        frame: whose poses and axes, such as "tool in work", as in `gough.jacobian`.
 
     Returns:
         Along x, y, z [platform unit / s] and about x, y, z [rad / s] of the base; infinite where
@@ -115,10 +127,15 @@ def axis_speeds(platform: Platform, pose: Pose, leg_speed: ArrayLike | None = No
     """
     speeds = _leg_speeds(platform, leg_speed)
     with np.errstate(divide="ignore"):
-        return np.min(speeds[:, None] / np.abs(_leg_jacobian(platform, pose)), axis=-2)
+        return np.min(speeds[:, None] / np.abs(_leg_jacobian(platform, pose, frame)), axis=-2)
 
 
-def top_speeds(platform: Platform, pose: Pose, leg_speed: ArrayLike | None = None) -> Array:
+def top_speeds(
+    platform: Platform,
+    pose: Pose,
+    leg_speed: ArrayLike | None = None,
+    frame: str | None = None,
+) -> Array:
     """Highest speeds that the platform can take with the legs within their speeds, (..., 2).
 
     The twists that the legs allow are a polytope, and the speed of the position, as the angular
@@ -127,6 +144,7 @@ def top_speeds(platform: Platform, pose: Pose, leg_speed: ArrayLike | None = Non
     Args:
         pose: batch axes (...).
         leg_speed: as in `axis_speeds`.
+        frame: whose poses and axes, such as "tool in work", as in `gough.jacobian`.
 
     Returns:
         Speed of the pose's position in any motion [platform unit / s], angular speed in any motion
@@ -139,7 +157,7 @@ def top_speeds(platform: Platform, pose: Pose, leg_speed: ArrayLike | None = Non
         array([630.24,   3.19])
     """
     corners = np.array(list(product([-1.0, 1.0], repeat=6))) * _leg_speeds(platform, leg_speed)
-    inverse, regular, known = _inverse(_leg_jacobian(platform, pose))
+    inverse, regular, known = _inverse(_leg_jacobian(platform, pose, frame))
     twists = np.einsum("...ij,cj->...ci", inverse, corners)
     parts = twists.reshape(*twists.shape[:-1], 2, 3)
     found = np.max(np.linalg.norm(parts, axis=-1), axis=-2)
@@ -243,9 +261,9 @@ def _or_lowest(values: Array) -> Array:
     return np.where(np.isnan(values), -np.inf, values)
 
 
-def _leg_jacobian(platform: Platform, pose: Pose) -> Array:
+def _leg_jacobian(platform: Platform, pose: Pose, frame: str | None) -> Array:
     """Derivatives (..., 6, 6) of lengths or motor angles, whatever the sensors make of them."""
-    return jacobian(platform, pose) * platform.gain[:, None]
+    return jacobian(platform, pose, frame) * platform.gain[:, None]
 
 
 def _inverse(matrices: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:

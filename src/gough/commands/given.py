@@ -74,6 +74,7 @@ def row_given(
     platform: Platform,
     row: int = 1,
     reading: Reading | None = None,
+    frame: str | None = None,
 ) -> Trajectory | None:
     """The pose of a command line with its status, None if it gives none.
 
@@ -83,6 +84,7 @@ def row_given(
         platform: the machine.
         row: number of the row in a file, from 1.
         reading: options for reading a file.
+        frame: whose pose is given.
 
     Raises:
         InputError: both are given, or no pose can be found.
@@ -96,7 +98,7 @@ def row_given(
     if not legs and not pose:
         return None
     given = pose_given(pose) if pose else legs_given(legs)
-    return read_row(given, platform, row, reading=reading or Reading())
+    return read_row(given, platform, row, reading=reading or Reading(), frame=frame)
 
 
 def _given(where: str, words: tuple[str, ...], names: tuple[str, ...], expected: str) -> Given:

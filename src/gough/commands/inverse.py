@@ -44,7 +44,8 @@ def run(
     gough inverse poses/ -p mine.toml -o legs/
 
     Columns of a pose in a file are x, y, z in the platform's unit, and its rotation: qw, qx, qy,
-    qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz).
+    qz, or rx, ry, rz [rad], or rx_deg, ry_deg, rz_deg (R = Rx Ry Rz), or as makers write it:
+    U, V, W (PI), A, B, C (LinuxCNC) [deg], or roll, pitch, yaw [rad] (ROS).
 
     A folder of files goes on where it was stopped when the command is given again.
 

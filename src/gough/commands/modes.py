@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from gough.commands.folder import FolderOptions, JobOptions
 from gough.commands.given import Legs, readings_given
-from gough.commands.options import Json, PlatformName, option
+from gough.commands.options import Frame, Json, PlatformName, option
 
 if TYPE_CHECKING:
     from gough.modes.assembly import AssemblyModes
@@ -22,6 +22,7 @@ def run(
     *,
     platform: PlatformName,
     out: Annotated[str | None, option(metavar="OUT", aliases=["-o"])] = None,
+    frame: Frame = None,
     json: Json = False,
     plot: Annotated[str | None, option(metavar="FILE")] = None,
     workers: Annotated[int | None, option(metavar="N")] = None,
@@ -61,7 +62,8 @@ def run(
             reading=ReadingOptions().of(platform),
         )  # fmt: skip
     draw = None if plot is None else _painter(plot)
-    modes = assembly_modes(machine, readings_given(legs, machine, platform), workers=workers)
+    given = readings_given(legs, machine, platform)
+    modes = assembly_modes(machine, given, workers=workers, frame=frame)
     choice = choose_mode(modes)
     if json:
         as_json.print_json(_facts(modes, choice), out)
@@ -92,6 +94,8 @@ def _print(modes: AssemblyModes, choice: Choice, screen: Any) -> None:
     for k in range(min(sets, ROWS_PRINTED)):
         number = f"Row {k + 1}: " if batch else ""
         screen.print(number + _verdict(modes, choice, k), markup=False)
+        if modes.frame:
+            screen.print(f"poses of {modes.frame}", markup=False)
         if np.any(modes.row == k):
             screen.print(_table(modes, choice, k))
         screen.print(_summary(modes, choice, k), markup=False)
@@ -168,7 +172,7 @@ def _write(path: str, modes: AssemblyModes, choice: Choice) -> None:
     from gough.files import write_table
     from gough.files.modes import mode_table
 
-    write_table(path, mode_table(modes, choice), modes.platform)
+    write_table(path, mode_table(modes, choice), modes.platform, modes.frame or None)
 
 
 def _facts(modes: AssemblyModes, choice: Choice) -> dict:
@@ -192,4 +196,6 @@ def _facts(modes: AssemblyModes, choice: Choice) -> dict:
         }
         for k in range(len(legs))
     ]
-    return {"platform": modes.platform.name, "unit": modes.platform.unit, "sets": sets}
+    platform = modes.platform
+    facts = {"platform": platform.name, "unit": platform.unit, "frame": modes.frame}
+    return facts | {"sets": sets}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from gough.commands.given import Legs, PoseNumbers
-from gough.commands.options import FileOptions, PlatformName, ReadingOptions, option
+from gough.commands.options import FileOptions, Frame, PlatformName, ReadingOptions, option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +36,7 @@ def pose(
     platform: PlatformName,
     pose: PoseNumbers = None,
     row: Annotated[int, arg(metavar="N")] = 1,
+    frame: Frame = None,
     out: Picture = None,
 ) -> int:
     """Draw a pose in 3-D, with the readings of its legs within their strokes.
@@ -55,14 +56,15 @@ def pose(
     from gough.plot.pose import pose_figure
 
     machine = _machine(platform, out, "pose")
-    given = row_given(legs, pose, machine, row, ReadingOptions().of(platform))
+    given = row_given(legs, pose, machine, row, ReadingOptions().of(platform), frame)
     if given is not None and len(legs) > 1:
         print(f"{given.outcomes[0].label}: {given.outcomes[0].text}")
     found = machine.home if given is None else given.pose[0]
     translation, rotation = found.distance(machine.home)
     away = translation > 1e-9 * machine.size or rotation > 1e-9
     ghost = machine.home if away else None
-    return _save(pose_figure(machine, found, ghost=ghost), machine, out, "pose")
+    figure = pose_figure(machine, found, ghost=ghost, frame=frame)
+    return _save(figure, machine, out, "pose")
 
 
 def modes(
@@ -70,6 +72,7 @@ def modes(
     *,
     platform: PlatformName,
     row: Annotated[int, arg(metavar="N")] = 1,
+    frame: Frame = None,
     out: Picture = None,
 ) -> int:
     """Draw all poses that have six leg readings; see gough modes.
@@ -90,7 +93,7 @@ def modes(
     readings = readings_given(legs, machine, platform).reshape(-1, 6)
     if not 1 <= row <= len(readings):
         raise InputError(f"--row {row}: rows are 1 to {len(readings)}")
-    figure = modes_figure(assembly_modes(machine, readings[row - 1]))
+    figure = modes_figure(assembly_modes(machine, readings[row - 1], frame=frame))
     return _save(figure, machine, out, "modes")
 
 
@@ -145,6 +148,7 @@ def trajectory(
     *,
     platform: PlatformName,
     time: Annotated[str | None, option(metavar="COLUMN")] = None,
+    frame: Frame = None,
     out: Picture = None,
     seed: Annotated[str, arg(metavar="NAME")] = "auto",
     reading: FileOptions = ReadingOptions(),
@@ -167,8 +171,9 @@ def trajectory(
 
     machine = _machine(platform, out, "trajectory")
     envelope = read_trajectory(
-        file, machine, time=time, seed=seed, reading=reading.of(platform), tick=_check_signals
-    )
+        file, machine, time=time, seed=seed, reading=reading.of(platform), frame=frame,
+        tick=_check_signals,
+    )  # fmt: skip
     figure = trajectory_figure(machine, envelope, time=envelope.time,
                                title=f"{machine.name}: {_name(file)}")  # fmt: skip
     code = _save(figure, machine, out, "trajectory")

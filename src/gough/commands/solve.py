@@ -34,7 +34,10 @@ def run(
     workers: Annotated[int | None, option(metavar="N")] = None,
     leg_noise: Annotated[float | None, option(metavar="S")] = None,
     limits: Annotated[bool, option()] = False,
-    angles: Annotated[Literal["deg", "rad"] | None, option(metavar="deg|rad")] = None,
+    angles: Annotated[
+        Literal["deg", "rad", "uvw", "abc", "rpy"] | None,
+        option(metavar="deg|rad|uvw|abc|rpy"),
+    ] = None,
     keep: Keep = "",
     follow: Annotated[bool, option()] = False,
     max_shift: Annotated[float | None, option(metavar="S")] = None,
@@ -77,7 +80,8 @@ def run(
         limits: Add the margin that is left of the tightest limit of joints, legs, forces, stroke
             and workspace, as a share (1 in the middle, 0 at the limit), and its name. A platform
             whose file has a table [limits] needs no option for that.
-        angles: Write Euler angles, R = Rx Ry Rz, in this unit instead of quaternions.
+        angles: Write Euler angles instead of quaternions: R = Rx Ry Rz in this unit; or U, V, W as
+            PI, A, B, C as LinuxCNC, roll, pitch, yaw as ROS writes them.
         follow: Take rows for consecutive: start each at the pose before, and write an event of
             each, such as followed, found or jumped. Rows whose pose is not taken have none.
         max_shift: With --follow allow this translation from row to row, in the platform's unit;

@@ -78,11 +78,11 @@ def solve_file(
         out: .csv or .parquet to write, "-", or None to only count. Columns: the kept ones, the
             pose, status, residual [platform unit], iterations; with `leg_noise` std_x, std_y,
             std_z [platform unit], std_rx, std_ry, std_rz [rad], or std_rx_deg to std_rz_deg with
-            angles "deg"; with `certify` the radius of uniqueness [platform unit]; with `limits` the
-            margin and the name of the tightest limit.
+            angles in degrees; with `certify` the radius of uniqueness [platform unit]; with
+            `limits` the margin and the name of the tightest limit.
         platform: the machine.
         reading: options for reading the file.
-        angles: write Euler angles (R = Rx Ry Rz) in these units instead of quaternions.
+        angles: write Euler angles in this form instead of quaternions, see `Pose.to_frame`.
         leg_noise: standard deviation of the readings, in their unit.
         head: number of first rows that the report holds.
         progress: called after every block with the file and the counts so far.
@@ -116,9 +116,7 @@ def solve_file(
                 check_plausible(job.source, platform, readings)
                 report.start()
             if tracker:
-                solution = tracker.follow(readings, leg_noise=leg_noise)
-                solution = solution.with_limits(platform) if limits else solution
-                solution = solution.in_frame(platform, frame) if frame else solution
+                solution = tracker.follow(readings, leg_noise=leg_noise, limits=limits)
             else:
                 solution = solver(
                     readings, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous,
@@ -143,7 +141,7 @@ def _tracker(platform: Platform, settings: dict, follow: Mapping[str, float]) ->
 
     shared = {name: settings[name] for name in ("tolerance", "singular") if name in settings}
     seed: Any = settings.get("seed", "auto")
-    return make_tracker(platform, seed, **shared, **follow)
+    return make_tracker(platform, seed, settings.get("frame"), **shared, **follow)
 
 
 def inverse_file(

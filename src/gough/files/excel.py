@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from datetime import date, datetime, time, timedelta
 from typing import Any, BinaryIO
 
-from gough.columns import POSITION
+from gough.columns import position_columns
 from gough.errors import InputError
 from gough.files.csv import CsvSource
 from gough.files.layout import find_layout
@@ -51,7 +51,7 @@ def _has_legs(text: bytes, log: LogFormat) -> bool:
     """Return whether a sheet has columns of six legs or of a pose."""
     try:
         names = find_layout("sheet", text, log).names
-        return bool(log.find(names)) or all(name in names for name in POSITION)
+        return bool(log.find(names)) or position_columns(names) is not None
     except InputError:
         return False
 

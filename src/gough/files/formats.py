@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 
 from gough.checks import Array
-from gough.columns import LEGS, POSITION, file_leg_columns
+from gough.columns import LEGS, file_leg_columns, position_columns
 from gough.errors import GoughError, InputError
 from gough.files.csv import CsvSink, CsvSource
 from gough.files.excel import EXCEL, open_sheet
@@ -181,7 +181,7 @@ def _name_legs(source: Source, platform: Platform, form: LogFormat) -> list[str]
         InputError: given columns that are not there, or a unit that cannot be converted.
     """
     found = source.columns
-    has_pose = all(name in found for name in POSITION)
+    has_pose = position_columns(found) is not None
     if has_pose and not isinstance((*form.columns, "")[0], str):
         return []  # columns by number are those of logs, not of files with poses
     places = form.find(found)
@@ -300,12 +300,17 @@ def read_legs(
         return legs
 
 
-def write_table(path: str | Path, columns: Mapping[str, pa.Array], platform: Platform) -> None:
+def write_table(
+    path: str | Path, columns: Mapping[str, pa.Array], platform: Platform, frame: str | None = None
+) -> None:
     """Write columns to a .csv or .parquet file, or to standard output for "-".
+
+    Args:
+        frame: whose poses they hold, for the file's metadata.
 
     Raises:
         GoughError: a name of no known format, no such folder, a full disk; an old file at `path`
             is unchanged.
     """
-    with open_sink(path, describe(platform)) as sink:
+    with open_sink(path, describe(platform, frame)) as sink:
         sink.write(pa.table(dict(columns)))

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-from gough.columns import POSITION
+from gough.columns import position_columns
 from gough.errors import InputError
 from gough.files.log_format import LogFormat, unit_of
 
@@ -156,7 +156,7 @@ def _named(
         text = _text(line)
         for delimiter in sorted(delimiters, key=lambda d: (d == BLANKS, -text.count(d))):
             for names in _headers(text, delimiter):
-                if log.find(names) or all(name in names for name in POSITION):
+                if log.find(names) or position_columns(names) is not None:
                     return index, delimiter, names
     found = _above_numbers(lines[first : first + SEARCHED], delimiters)
     if found:

@@ -44,7 +44,7 @@ class Trajectory:
     Attributes:
         number: (n,) rows' numbers in the file, from 1.
         time: (n,) the column of times; NaN where absent.
-        pose: batch (n,).
+        pose: batch (n,), of the platform whatever the frame of the file.
         legs: (n, 6) readings.
         outcomes: (n,) statuses: `Status` for a file of readings; `InverseStatus` for one of poses,
             or the `Status` that the file states if that is not usable.
@@ -149,6 +149,7 @@ def open_trajectory(
     time: str | None = None,
     seed: str = "auto",
     reading: Reading = Reading(),
+    frame: str | None = None,
 ) -> Iterator[TrajectoryFile]:
     """Open a file of poses or of leg readings.
 
@@ -158,10 +159,12 @@ def open_trajectory(
         time: name of a column of times.
         seed: first guess for leg readings, as for `gough.solve`.
         reading: options for reading the file.
+        frame: whose poses the file holds, such as "tool in work"; those that the file states, or
+            the platform's, unless given.
 
     Raises:
-        GoughError: a name of no known format.
-        InputError: a file that cannot be read, or without the columns.
+        GoughError: a name of no known format, or an unknown frame.
+        InputError: a file that cannot be read, without the columns, or with poses of another frame.
     """
     with closing(open_source(path, platform, reading)) as source:
         columns = pose_or_leg_columns(source.where, source.columns)
@@ -169,8 +172,8 @@ def open_trajectory(
             time = source.reading.log.time
         if time is not None:
             checked(source.where, source.columns, (time,))
-        frame = source_frame(source, platform, None)
-        yield TrajectoryFile(source, platform, columns, time, seed, frame)
+        view = source_frame(source, platform, frame)
+        yield TrajectoryFile(source, platform, columns, time, seed, view)
 
 
 def read_row(
@@ -180,11 +183,12 @@ def read_row(
     *,
     seed: str = "auto",
     reading: Reading = Reading(),
+    frame: str | None = None,
 ) -> Trajectory:
     """Read the pose in one row of a file of poses, or solve one row of leg readings.
 
     Args:
-        path, platform, seed, reading: as for `open_trajectory`.
+        path, platform, seed, reading, frame: as for `open_trajectory`.
         row: number of the row, from 1.
 
     Returns:
@@ -194,7 +198,7 @@ def read_row(
         InputError: there is no such row, or it has no pose.
     """
     seen = 0
-    with open_trajectory(path, platform, seed=seed, reading=reading) as file:
+    with open_trajectory(path, platform, seed=seed, reading=reading, frame=frame) as file:
         for rows in file.blocks():
             seen += len(rows)
             chosen = rows[rows[:, 0] == row]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
-from gough.columns import Angles, solution_names
+from gough.columns import Angles, in_degrees, solution_names
 from gough.errors import GoughError
 from gough.platform import Platform
 from gough.pose import Pose, pose_cells, pose_table
@@ -85,16 +85,11 @@ class Solution:
         )  # fmt: skip
 
     def with_limits(self, platform: Platform, *, workers: int | None = None) -> Solution:
-        """Return the solution with the margins of its poses; see `gough.limits`.
-
-        Raises:
-            GoughError: the poses are those of a frame, not of the platform.
-        """
+        """Return the solution with the margins of its poses; see `gough.limits`."""
         from gough.margins import limits
 
-        if self.frame:
-            raise GoughError(f"limits: these are the poses of {self.frame!r}, not of the platform")
-        return replace(self, limits=limits(platform, self.pose, workers=workers))
+        frame = self.frame or None
+        return replace(self, limits=limits(platform, self.pose, workers=workers, frame=frame))
 
     def in_frame(self, platform: Platform, name: str) -> Solution:
         """Return the solution with poses of a frame of the platform, and their covariance.
@@ -122,8 +117,8 @@ class Solution:
         Args:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
                 else pandas. A pandas table has the row labels of that of the readings.
-            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz),
-                instead of the quaternion.
+            angles: Euler angles instead of the quaternion: "deg", "rad", "uvw", "abc" or "rpy",
+                see `Pose.to_frame`.
 
         Raises:
             GoughError: another kind or angle, or a library that is not installed.
@@ -172,7 +167,7 @@ def solution_columns(solution: Solution, angles: Angles | None) -> dict[str, pa.
     if solution.covariance is not None:
         variances = np.diagonal(solution.covariance, axis1=-2, axis2=-1)
         deviations = np.sqrt(variances).reshape(-1, 6)
-        if angles == "deg":
+        if in_degrees(angles):
             deviations[:, 3:] = np.degrees(deviations[:, 3:])
         numbers += list(deviations.T)
     if solution.radius is not None:

@@ -71,21 +71,20 @@ def solve(
     if follow:
         if certify or ambiguous:
             raise GoughError("follow: certify and ambiguous look at each row alone; leave them out")
-        if frame and isinstance(seed, Pose):
-            seed = platform.frame(frame).platform_pose(seed)
-        tracker = make_tracker(platform, seed, tolerance=tolerance, singular=singular)
-        found = tracker.follow(legs, leg_noise=leg_noise)
-        found = found.with_limits(platform) if limits else found
-        return found.in_frame(platform, frame) if frame else found
+        tracker = make_tracker(platform, seed, frame, tolerance=tolerance, singular=singular)
+        return tracker.follow(legs, leg_noise=leg_noise, limits=limits)
     solver = Solver(platform, seed, tolerance, max_iterations, restarts, singular, workers, frame)
     return solver(legs, leg_noise=leg_noise, certify=certify, ambiguous=ambiguous, limits=limits)
 
 
-def make_tracker(platform: Platform, seed: str | Seed | Pose, **limits: float | None) -> Tracker:
+def make_tracker(
+    platform: Platform, seed: str | Seed | Pose, frame: str | None, **limits: float | None
+) -> Tracker:
     """Return a tracker for consecutive rows.
 
     Args:
         seed: the machine's pose before the first row, or "auto" to find it from that row.
+        frame: whose poses are returned, and given as seed.
         limits: arguments of `gough.Tracker`.
 
     Raises:
@@ -96,8 +95,10 @@ def make_tracker(platform: Platform, seed: str | Seed | Pose, **limits: float | 
     given = isinstance(seed, Pose) and not seed.batch
     if not given and seed not in ("auto", "home"):
         raise GoughError("seed: rows that follow each other start at one pose, or at auto or home")
-    start = seed if isinstance(seed, Pose) else platform.home if seed == "home" else None
-    return Tracker(platform, start=start, **limits)  # pyright: ignore[reportArgumentType]
+    start = seed if isinstance(seed, Pose) else None
+    if seed == "home":
+        start = platform.frame(frame).of(platform.home) if frame else platform.home
+    return Tracker(platform, start=start, frame=frame, **limits)  # pyright: ignore[reportArgumentType]
 
 
 @dataclass(frozen=True)

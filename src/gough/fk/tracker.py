@@ -50,6 +50,7 @@ class Tracker:
     Attributes:
         pose: the present pose. The same object every cycle, overwritten by the next `update`
             (so that a cycle allocates nothing); `pose.copy()` keeps one.
+        frame: whose pose that is, such as "tool in work"; "" for the platform's.
         status: `Status` of the last reading.
         event: `Event` of the last cycle.
 
@@ -75,23 +76,29 @@ class Tracker:
         tolerance: float = 1e-12,
         singular: float = SINGULAR,
         period: float = 1.0,
+        frame: str | None = None,
     ) -> None:
         """Compile or load what a cycle needs, so that the first `update` is as quick as others.
 
         Args:
-            start: the platform's pose; found from the first reading unless given.
+            start: the pose of the platform, or of `frame`; found from the first reading unless
+                given.
             max_shift: largest translation of the pose's position (the pivot, where the platform
                 has one) in one cycle [platform unit]; 2 % of the platform's size unless given.
             max_turn: largest rotation in one cycle [rad].
             confirm: how many readings must agree on a place too far away before it is taken.
             tolerance, singular: as for `gough.solve`.
             period: time of one cycle [s], for `twist`; unless given, rates are per cycle.
+            frame: whose poses and twists are given and returned, such as "tool in work" (see
+                `Platform.frame`); the limits stay those of the platform's own pose.
 
         Raises:
-            GoughError: a limit that is not above zero, or a start that is not one pose.
+            GoughError: a limit that is not above zero, a start that is not one pose, or an unknown
+                frame.
         """
         platform = as_platform(platform)
-        self.platform = platform
+        self.platform, self.frame = platform, frame or ""
+        self._view = platform.frame(frame) if frame else None
         self._solver = Solver(platform, tolerance=tolerance, singular=singular, workers=1)
         shift = 0.02 * platform.size if max_shift is None else max_shift
         self._max_shift = as_number("max_shift", shift, above=0.0)
@@ -100,6 +107,7 @@ class Tracker:
         self._period = as_number("period", period, above=0.0)
         if start is not None:
             _check_start(start)
+            start = start if self._view is None else self._view.platform_pose(start)
         self._constants = kernel_constants(platform, self._solver.singular)
         self._limits = np.array([self._solver.tolerance, self._solver.singular, 0.0, 0.0])
         self._legs = platform.home_legs[None].copy()
@@ -114,13 +122,16 @@ class Tracker:
             0,
         )  # residual and iterations of the last reading that was not followed
         self._candidate: Pose | None = None
-        self.pose = Pose.trusted(self._position[0], self._wxyz[0])
+        self._own = self.pose = Pose.trusted(self._position[0], self._wxyz[0])
+        if self._view is not None:
+            self.pose = Pose.trusted(np.zeros(3), np.zeros(4))
         self._code, self.event = int(Status.CONVERGED), Event.FOUND
         self._set_pose(platform.home)
         self._run_cycle()  # these compile what a cycle may need, if it is not yet on disk
         self._solver.compile()
         self._lost = start is None
         self._set_pose(platform.home if start is None else start)
+        self._show_pose()
 
     @property
     def status(self) -> Status:
@@ -129,7 +140,7 @@ class Tracker:
 
     @property
     def twist(self) -> Array:
-        """Twist (6,) of the platform in the last cycle, in base coordinates.
+        """Twist (6,) of the platform in the last cycle, in base coordinates; or of `frame`.
 
         Velocity of the pose's position [platform unit / s] and angular velocity [rad / s]; per
         cycle unless `period` was given. At the pose itself if the last `update` was given the rates
@@ -139,10 +150,11 @@ class Tracker:
         if self.event != Event.FOLLOWED:
             return np.full(6, np.nan)
         if self._rates is not None:
-            return velocities.twist(self.platform, self.pose, self._rates)
-        last = self._state[0, LAST_POSITION:LAST_WXYZ], self._state[0, LAST_WXYZ:]
-        turn = quaternion.product(self._wxyz[0], quaternion.conjugate(last[1]))
-        moved = self._position[0] - last[0]
+            return velocities.twist(self.platform, self.pose, self._rates, self.frame or None)
+        last = Pose.trusted(self._state[0, LAST_POSITION:LAST_WXYZ], self._state[0, LAST_WXYZ:])
+        last = last if self._view is None else self._view.of(last)
+        turn = quaternion.product(self.pose.wxyz, quaternion.conjugate(last.wxyz))
+        moved = self.pose.position - last.position
         motion = np.concatenate([moved, quaternion.to_rotation_vector(turn)])
         return motion / (self._period * self._elapsed)
 
@@ -173,16 +185,23 @@ class Tracker:
             self._code, self.event = code, Event.FOLLOWED
             if self._missed:
                 self._reset_missed()
+        self._show_pose()
         return self.pose
 
-    def follow(self, legs: ArrayLike | Table, *, leg_noise: ArrayLike | None = None) -> Solution:
+    def follow(
+        self,
+        legs: ArrayLike | Table,
+        *,
+        leg_noise: ArrayLike | None = None,
+        limits: bool = False,
+    ) -> Solution:
         """Follow consecutive readings, row by row as `update` does, in compiled code.
 
         Another call goes on where this one ended, so that a long series may come in parts.
 
         Args:
             legs: readings (N, 6), or a table with columns leg_1 to leg_6.
-            leg_noise: as for `gough.solve`.
+            leg_noise, limits: as for `gough.solve`.
 
         Returns:
             Solution: batch (N,); `Solution.event` is the `Event` of each row, and rows whose
@@ -215,10 +234,13 @@ class Tracker:
             row += 1
         pose = Pose.trusted(rows.position, rows.wxyz)
         covariance = None if leg_noise is None else pose_covariance(self.platform, pose, leg_noise)
-        return Solution(
+        self._show_pose()
+        found = Solution(
             pose, rows.status, rows.residual, rows.iterations, covariance,
             unit=self.platform.unit, table=table_info(legs), event=events,
         )  # fmt: skip
+        found = found.with_limits(self.platform) if limits else found
+        return found.in_frame(self.platform, self.frame) if self.frame else found
 
     def _put(self, rows: Rows, row: int) -> None:
         """Copy the last cycle's results; a row whose pose was not taken has none."""
@@ -248,6 +270,12 @@ class Tracker:
             self._constants, self._legs, self._state, self._limits, self._buffer, self._work,
             self._position, self._wxyz,
         )  # fmt: skip
+
+    def _show_pose(self) -> None:
+        """Set `pose` to the frame's; the platform's is set by the compiled cycle itself."""
+        if self._view is not None:
+            shown = self._view.of(self._own)
+            self.pose.position[:], self.pose.wxyz[:] = shown.position, shown.wxyz
 
     def _reset_missed(self) -> None:
         """Forget missed cycles: one cycle's motion is the limit again."""

@@ -38,7 +38,11 @@ DISTANT = 1e3  # normalised: starts beyond belong to no pose, where the base joi
 
 
 def assembly_modes(
-    platform: Platform | str | Path, legs: ArrayLike | Table, *, workers: int | None = None
+    platform: Platform | str | Path,
+    legs: ArrayLike | Table,
+    *,
+    workers: int | None = None,
+    frame: str | None = None,
 ) -> AssemblyModes:
     """All real poses for leg readings, each with a certificate, and whether the list is complete.
 
@@ -49,13 +53,15 @@ def assembly_modes(
     Args:
         legs: readings (..., 6) of any kind of leg, or a table as for `solve`.
         workers: number of threads; all cores unless given.
+        frame: whose poses are returned, such as "tool in work" (see `Platform.frame`); those of the
+            platform unless given.
 
     Returns:
         The poses of all sets of readings. Sets with NaN, infinity or a length not above 0 have
         no poses and the status INVALID_INPUT.
 
     Raises:
-        GoughError: legs of another shape, or not numbers.
+        GoughError: legs of another shape, or not numbers, or an unknown frame.
 
     Example:
         >>> import gough
@@ -64,6 +70,8 @@ def assembly_modes(
         AssemblyModes(40 poses, complete)
     """
     platform = as_platform(platform)
+    if frame is not None:
+        platform.frame(frame)  # refused before any work
     readings = as_readings(legs)
     base, lengths = equivalent_struts(platform, readings.reshape(-1, 6))
     struts = base if platform.rotary is not None else platform.base[None], lengths
@@ -84,9 +92,10 @@ def assembly_modes(
     status, paths, multiplicity = settle_doubts(found, order, proof.certified, start.count)
     batch = readings.shape[:-1]
     return AssemblyModes(
-        platform=platform, legs=readings, pose=pose, row=row, multiplicity=multiplicity,
+        platform=platform, legs=readings, platform_pose=pose, row=row, multiplicity=multiplicity,
         certificate=proof, status=status.reshape(batch), paths=paths.reshape(*batch, 4),
         solutions=start.count, struts=struts, table=table_info(legs),
+        frame=frame or "",
     )  # fmt: skip
 
 

@@ -73,7 +73,8 @@ def choose_mode(
     angles).
 
     Args:
-        near: the last known pose, () or one for each set of readings (...): "near" passes poses
+        near: the last known pose (of `modes.frame`, as `up` and `orientation`), () or one for each
+            set of readings (...): "near" passes poses
             within max_shift [platform unit] and max_turn [rad] of it, and the ranking goes by
             distance to it.
         up: (3,) or (..., 3), the vertical of the base as an inclinometer on the platform measures
@@ -98,7 +99,7 @@ def choose_mode(
     """
     if (up is not None or orientation is not None) and not hint_error > 0:
         raise GoughError("hint_error: expected the sensor's error in rad, above 0, beside a hint")
-    platform, pose = modes.platform, modes.pose
+    platform, pose = modes.platform, modes.platform_pose
     passes = {"side": same_side(platform, pose)}
     if home_sign(platform):
         passes["sign"] = modes.sign > 0
@@ -110,19 +111,21 @@ def choose_mode(
         passes["branch"] = _on_branch(platform, pose, modes.readings)
     if max_swing < np.inf:
         passes["swing"] = swing(platform, pose) <= max_swing
-    target = platform.home if near is None else _for_poses("near", near, modes)
-    translation, rotation = pose.distance(target)
+    if near is None:
+        translation, rotation = pose.distance(platform.home)
+    else:
+        translation, rotation = modes.pose.distance(_for_poses("near", near, modes))
     if near is not None:
         passes["near"] = (translation <= max_shift) & (rotation <= max_turn)
     if up is not None:
         vertical = _per_pose("up", as_batch("up", up, (3,)), modes)
         vertical = vertical / np.linalg.norm(vertical, axis=-1, keepdims=True)
-        x, y, z = (pose.rotation @ vertical[..., None])[..., 0].T
+        x, y, z = (modes.pose.rotation @ vertical[..., None])[..., 0].T
         passes["up"] = np.arctan2(np.hypot(x, y), z) <= hint_error
     if orientation is not None:
         hint = Pose(np.zeros(3), as_batch("orientation", orientation, (4,)))
         hint = _for_poses("orientation", hint, modes)
-        passes["orientation"] = pose.distance(hint)[1] <= hint_error
+        passes["orientation"] = modes.pose.distance(hint)[1] <= hint_error
     return _ranked(modes, passes, translation / platform.size + rotation)
 
 

@@ -36,7 +36,7 @@ class AssemblyModes:
     Attributes:
         platform: the machine.
         legs: (..., 6) the readings.
-        pose: batch (M,).
+        platform_pose: batch (M,), the poses of the platform.
         row: (M,) the set of readings that a pose belongs to; 0 for a single set.
         multiplicity: (M,) 1 for a regular pose, above 1 where several solutions meet (a
             singular pose), 0 for a sample of a curve of poses.
@@ -48,6 +48,7 @@ class AssemblyModes:
         struts: lower ends (N, 6, 3), or (1, 6, 3) if they never move, and lengths (N, 6) of the
             struts that the N sets of readings stand for [platform unit].
         table: library and row labels of the table of readings, if they came in one.
+        frame: whose poses `pose` holds, such as "tool in work"; "" for those of the platform.
 
     Example:
         >>> import gough
@@ -59,7 +60,7 @@ class AssemblyModes:
 
     platform: Platform
     legs: Array
-    pose: Pose
+    platform_pose: Pose
     row: NDArray[np.int64]
     multiplicity: NDArray[np.int32]
     certificate: Certificate
@@ -68,23 +69,30 @@ class AssemblyModes:
     solutions: int
     struts: tuple[Array, Array]
     table: TableInfo | None = None
+    frame: str = ""
+
+    @cached_property
+    def pose(self) -> Pose:
+        """Poses (M,), of `frame` if there is one."""
+        own = self.platform_pose
+        return self.platform.frame(self.frame).of(own) if self.frame else own
 
     @cached_property
     def residual(self) -> Array:
         """(M,) largest difference between a strut's length and its reading's [platform unit]."""
         base, lengths = struts_of_sets(self.struts, self.row)
-        struts = joint_positions(self.platform, self.pose) - base
+        struts = joint_positions(self.platform, self.platform_pose) - base
         return np.abs(np.linalg.norm(struts, axis=-1) - lengths).max(axis=-1, initial=0.0)
 
     @cached_property
     def singularity_distance(self) -> Array:
         """(M,) see `gough.singularity_distance`; rotary poses that the motors reach only."""
-        return singularity_distance(self.platform, self.pose)
+        return singularity_distance(self.platform, self.platform_pose)
 
     @cached_property
     def sign(self) -> Array:
         """(M,) sign of the Jacobian's determinant times that at home."""
-        return assembly_sign(self.platform, self.pose)
+        return assembly_sign(self.platform, self.platform_pose)
 
     @property
     def certified(self) -> NDArray[np.bool_]:
@@ -122,7 +130,7 @@ class AssemblyModes:
         behind = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
         mine = np.repeat(np.searchsorted(self.row, flat), count) + behind
         return replace(
-            self, legs=self.legs[index], pose=self.pose[mine], row=row,
+            self, legs=self.legs[index], platform_pose=self.platform_pose[mine], row=row,
             multiplicity=self.multiplicity[mine], certificate=self.certificate[mine],
             status=self.status[index], paths=self.paths[index],
             struts=struts_of_sets(self.struts, flat),
@@ -143,8 +151,8 @@ class AssemblyModes:
             kind: "pandas", "polars" or "pyarrow"; unless given, as the table of readings was,
                 else pandas. A pandas table has the row labels of that of the readings, each as
                 often as its readings have poses.
-            angles: "deg" or "rad": Euler angles, rx_deg to rz_deg or rx to rz (R = Rx Ry Rz),
-                instead of the quaternion.
+            angles: Euler angles instead of the quaternion: "deg", "rad", "uvw", "abc" or "rpy",
+                see `Pose.to_frame`.
 
         Raises:
             GoughError: another kind or angle, or a library that is not installed.

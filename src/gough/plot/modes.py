@@ -55,7 +55,7 @@ def modes_figure(modes: AssemblyModes) -> Figure:
     columns = max(1, min(count, FEW // 2) if few else math.ceil(math.sqrt(1.6 * count)))
     rows = max(1, math.ceil(count / columns))
     base = equivalent_struts(modes.platform, modes.legs)[0]
-    joints = joint_positions(modes.platform, modes.pose)
+    joints = joint_positions(modes.platform, modes.platform_pose)
     low, high = _frames(_oblique(base), _oblique(joints))
     span = (high - low).max(axis=0, initial=1e-9)
     wide = (FEW_CELL if few else CELL) * columns
@@ -74,10 +74,11 @@ def modes_figure(modes: AssemblyModes) -> Figure:
     if few:
         figure.legend(handles=_marks(), loc="outside lower center", ncols=1 if columns < 3 else 3)
     certified = int(modes.certified.sum())
+    shown = f"\nposes of {modes.frame}" if modes.frame and few else ""
     plural = "" if count == 1 else "s"
     figure.suptitle(
         f"{modes.platform.name}: {count} pose{plural} with the same six readings,"
-        f"{chr(10) if columns < 3 else ' '}{certified} proven"
+        f"{chr(10) if columns < 3 else ' '}{certified} proven{shown}"
     )
     return figure
 
@@ -125,7 +126,8 @@ def _draw_apart(
         _single(axes, ground, plates[i], base, joints[i], float(modes.sign[i]))
         axes.text(0.02, 0.99, f"{k + 1}", fontsize=8, va="top", transform=axes.transAxes)
         if len(plates) <= FEW:
-            axes.set_title(pose_text(modes.platform, modes.pose[i]), fontsize=7.5)
+            text = pose_text(modes.platform, modes.platform_pose[i], modes.frame)
+            axes.set_title(text, fontsize=7.5)
 
 
 def _frames(ground: Array, plates: Array) -> tuple[Array, Array]:

@@ -144,7 +144,12 @@ def pose_axes(figure: Any, platform: Platform, poses: Sequence[Pose], place: Any
 
 @styled
 def pose_figure(
-    platform: Platform, pose: Pose, *, ghost: Pose | None = None, title: str = ""
+    platform: Platform,
+    pose: Pose,
+    *,
+    ghost: Pose | None = None,
+    title: str = "",
+    frame: str | None = None,
 ) -> Figure:
     """Draw one pose in 3-D, and the readings of its legs within their strokes.
 
@@ -153,13 +158,14 @@ def pose_figure(
         pose: the pose.
         ghost: a second pose, dashed, such as home or the true pose.
         title: text above the picture; without it the platform's name and the pose.
+        frame: whose pose the title states, such as "tool in work"; `pose` is the platform's.
 
     Raises:
-        GoughError: a batch of poses, or a pose of NaN.
+        GoughError: a batch of poses, a pose of NaN, or an unknown frame.
     """
     bones = skeleton(platform, pose)
     figure = new_figure(8.0, 4.5)
-    figure.suptitle(title or _title(platform, pose))
+    figure.suptitle(title or _title(platform, pose, frame))
     poses = [pose] if ghost is None else [pose, ghost]
     left, _, right = figure.add_gridspec(1, 3, width_ratios=[1.7, 0.1, 1])
     axes = pose_axes(figure, platform, poses, left)
@@ -286,8 +292,9 @@ def _legend(figure: Figure, bones: Skeleton, ghost: bool) -> None:
     )  # fmt: skip
 
 
-def _title(platform: Platform, pose: Pose) -> str:
-    where = pose_text(platform, pose).replace("\n", ", ")
+def _title(platform: Platform, pose: Pose, frame: str | None) -> str:
+    where = pose_text(platform, pose, frame).replace("\n", ", ")
+    where = f"{frame} at {where}" if frame else where
     away = float(singularity_distance(platform, pose))
     if np.isnan(away):
         return f"{platform.name}: {where}\nout of the motors' reach"

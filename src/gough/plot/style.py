@@ -170,8 +170,9 @@ def label_number(value: float, size: float) -> str:
     return f"{value:z.{decimals(size, 4)}f}".replace("-", MINUS)
 
 
-def pose_text(platform: Platform, pose: Pose) -> str:
-    """Position and Euler angles of one pose in two lines."""
+def pose_text(platform: Platform, pose: Pose, frame: str | None = None) -> str:
+    """Position and Euler angles of one pose of the platform, or of a frame, in two lines."""
+    pose = platform.frame(frame).of(pose) if frame else pose
     sizes = 3 * [platform.size / 10] + 3 * [10.0]
     numbers = list(map(label_number, pose_values(pose, "deg"), sizes))
     lengths, angles = ", ".join(numbers[:3]), ", ".join(numbers[3:])

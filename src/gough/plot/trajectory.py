@@ -16,6 +16,7 @@ from gough.checks import Array
 from gough.errors import InputError
 from gough.files.rows import Reading, Source
 from gough.files.trajectory import Trajectory, TrajectoryFile, open_trajectory
+from gough.frames import FramePose
 from gough.platform import Platform
 from gough.plot.style import (
     CURVES,
@@ -54,9 +55,11 @@ class Envelope:
         rows: rows added.
         unanswered: number of them without a usable pose.
         time: name of the column on the horizontal axis, or "row".
+        frame: whose poses x to rz are; None for those of the platform.
     """
 
     time = "row"
+    frame: FramePose | None = None
 
     def __init__(self, names: tuple[str, ...], bins: int = BINS) -> None:
         self.names, self.width, self.rows, self.unanswered = names, 1, 0, 0
@@ -130,6 +133,7 @@ def read_trajectory(
     time: str | None = None,
     seed: str = "auto",
     reading: Reading = Reading(),
+    frame: str | None = None,
     tick: Callable[[Source], None] | None = None,
 ) -> Envelope:
     """Read a file of poses or of leg readings into an envelope for `trajectory_figure`.
@@ -143,17 +147,21 @@ def read_trajectory(
             or else rows are counted from 1.
         seed: first guess for leg readings, as for `gough.solve`.
         reading: options for reading the file.
+        frame: whose poses are drawn, such as "tool in work"; those that the file states, or the
+            platform's, unless given.
         tick: called after every block.
 
     Raises:
         GoughError, InputError: an error in the file, with its row or line.
     """
     envelope = Envelope(SIGNALS)
-    with open_trajectory(path, platform, time=time, seed=seed, reading=reading) as file:
-        envelope.time = file.time or "row"
+    options = {"time": time, "seed": seed, "reading": reading, "frame": frame}
+    with open_trajectory(path, platform, **options) as file:
+        envelope.time, envelope.frame = file.time or "row", file.frame
         for rows in file.blocks(tick):
             found = file.solve(rows)
-            values = signals(platform, found.legs, found.pose)
+            pose = found.pose if file.frame is None else file.frame.of(found.pose)
+            values = signals(platform, found.legs, pose)
             values[~found.usable, 0 if file.has_poses else 6 :] = np.nan
             envelope.add(_times(file, found), values, found.usable)
     return envelope
@@ -184,7 +192,8 @@ def trajectory_figure(
     _legs(panels[0], platform, envelope)
     _position(panels[1], platform, envelope)
     _curves(panels[2], envelope, range(9, 12), SIGNALS[9:], wrap=True)
-    panels[2].set_ylabel("angle [deg]\nR = Rx Ry Rz")
+    whose = "" if envelope.frame is None else f" of {envelope.frame.name}"
+    panels[2].set_ylabel(f"angle{whose} [deg]\nR = Rx Ry Rz")
     label = _time_label(time)
     panels[2].set_xlabel(label)
     if time == "row":
@@ -255,14 +264,16 @@ def _legs(axes: Axes, platform: Platform, envelope: Envelope) -> None:
 
 def _position(axes: Axes, platform: Platform, envelope: Envelope) -> None:
     """Position from home; the height of the machine would flatten the other curves."""
-    home = platform.home.position
+    view = envelope.frame
+    home = (platform.home if view is None else view.of(platform.home)).position
     names = []
     for name, value in zip("xyz", home, strict=True):
         sign = MINUS if value > 0 else "+"
         text = label_number(abs(value), platform.size)
         names.append(name if not value else f"{name} {sign} {text.rstrip('0').rstrip('.')}")
     _curves(axes, envelope, range(6, 9), names, offsets=home)
-    axes.set_ylabel(f"position from home\n[{length_unit(platform)}]")
+    whose = "position" if view is None else view.name
+    axes.set_ylabel(f"{whose} from home\n[{length_unit(platform)}]")
 
 
 def _curves(axes: Axes, envelope: Envelope, which, names, *, offsets=None, wrap=False) -> None:
