@@ -11,8 +11,9 @@ from matplotlib.contour import QuadContourSet
 
 import gough
 from gough.plot import WorkspaceSlice, new_figure, workspace_figure, workspace_slice
+from gough.plot.slices import COORDINATES
 from gough.plot.style import VERMILION
-from gough.plot.workspace import COORDINATES, draw_slice
+from gough.plot.workspace import draw_slice
 
 MACHINES = gough.Platform.catalog()
 

@@ -11,9 +11,10 @@ from gough.pose import pose_values
 from gough.skeleton import outside_stroke
 from gough.units import scaled
 from gough.view import meshes
+from gough.view.beyond import leg_factor
 from gough.view.follow import BLOCKED, REFUSED, follow, has_pose, step_solver
-from gough.view.model import UNCHANGED, Answer, Model, leg_factor
-from gough.view.panel import leg_ranges, pose_ranges
+from gough.view.model import UNCHANGED, Answer, Model
+from gough.view.sliders import leg_ranges, pose_ranges
 
 CATALOG = Platform.catalog()
 

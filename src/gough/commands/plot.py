@@ -27,6 +27,7 @@ Picture = Annotated[
     ),
 ]
 Coordinate = Literal["x", "y", "z", "rx", "ry", "rz"]
+WorkspaceQuantity = Literal["singularity", "margin", "force", "stiffness", "speed", "error"]
 Value = Annotated[float | None, option(metavar="V")]
 
 
@@ -112,13 +113,17 @@ def workspace(
         option(metavar="A1 A2 B1 B2"),
     ] = None,
     resolution: Annotated[int, arg(metavar="N")] = 271,
+    quantity: Annotated[WorkspaceQuantity, option(metavar="NAME")] = "singularity",
+    frame: Frame = None,
     out: Picture = None,
 ) -> int:
-    """Draw a slice of the workspace: distance to singularity, stroke limits.
+    """Draw a slice of the workspace, and which limit ends it where.
 
     gough plot workspace -p nasa_msfc --axes x z
 
     gough plot workspace -p reachy_mini --axes rx ry --z 0.18 -o tilt.png
+
+    gough plot workspace -p cell.toml --frame 'tool in work' --quantity error
 
     Lengths are in the platform's unit, angles (R = Rx Ry Rz) in degrees.
 
@@ -133,13 +138,20 @@ def workspace(
         span: Draw from the lowest to the highest value of the first and of the second axis;
             without it a little more than workspace and stroke allow.
         resolution: Take this many poses along each axis.
+        quantity: Show by colour: singularity (distance to it), margin (share left of the tightest
+            limit), force (largest of a leg under the payload of the platform's file), stiffness (in
+            the softest direction), speed (highest of the position) or error (largest of the
+            position by that of the readings).
     """
-    from gough.plot.workspace import workspace_figure, workspace_slice
+    from gough.plot.slices import workspace_slice
+    from gough.plot.workspace import workspace_figure
 
     machine = _machine(platform, out, "workspace")
     given = {"x": x, "y": y, "z": z, "rx": rx, "ry": ry, "rz": rz}
     at = {name: value for name, value in given.items() if value is not None}
-    cut = workspace_slice(machine, axes, at=at, span=span, resolution=resolution)
+    cut = workspace_slice(
+        machine, axes, at=at, span=span, resolution=resolution, quantity=quantity, frame=frame
+    )
     return _save(workspace_figure(cut), machine, out, "workspace")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from gough.commands.given import Legs, PoseNumbers
-from gough.commands.options import FileOptions, PlatformName, ReadingOptions, option
+from gough.commands.options import FileOptions, Frame, PlatformName, ReadingOptions, option
 
 if TYPE_CHECKING:
     from gough.platform import Platform
@@ -27,6 +27,7 @@ def run(
     *,
     platform: PlatformName,
     pose: PoseNumbers = None,
+    frame: Frame = None,
     html: Annotated[str | None, option(metavar="OUT")] = None,
     host: Annotated[str, arg(metavar="HOST")] = "localhost",
     port: Annotated[int | None, option(metavar="N")] = None,
@@ -72,36 +73,36 @@ def run(
     if pose is None and isinstance(path := legs_given(legs) if legs else None, str):
         from gough.view.trajectory import read
 
-        played = read(path, machine, rows=rows, time=time, reading=options)
+        played = read(path, machine, rows=rows, time=time, reading=options, frame=frame)
+        frame = played.frame
         print(played.about, flush=True)
-    elif given := row_given(legs, pose, machine, reading=options):
+    elif given := row_given(legs, pose, machine, reading=options, frame=frame):
         start = given.pose[0]
     if html is not None:
-        return _write(html, machine, played, start)
-    return _serve(machine, played, start, host, port, open_browser)
+        return _write(html, machine, played, start, frame)
+    from gough.view.viewer import Viewer
+
+    viewer = Viewer(machine, host=host, port=port, trajectory=played, start=start, frame=frame)
+    return _serve(viewer, host, port, open_browser)
 
 
-def _write(path: str, platform: Platform, trajectory: Trajectory | None, start: Pose | None) -> int:
+def _write(
+    path: str,
+    platform: Platform,
+    trajectory: Trajectory | None,
+    start: Pose | None,
+    frame: str | None,
+) -> int:
     from gough.view.export import page
     from gough.view.model import Model
     from gough.whole_file import write_whole
 
-    write_whole(path, page(Model(platform, start), trajectory).encode())
+    write_whole(path, page(Model(platform, start, frame), trajectory).encode())
     print(f"{path}: {Path(path).stat().st_size / 1e6:.1f} MB; opens in any browser, offline")
     return 1 if trajectory is not None and trajectory.failures else 0
 
 
-def _serve(
-    platform: Platform,
-    trajectory: Trajectory | None,
-    start: Pose | None,
-    host: str,
-    port: int | None,
-    browser: bool,
-) -> int:
-    from gough.view.viewer import Viewer
-
-    viewer = Viewer(platform, host=host, port=port, trajectory=trajectory, start=start)
+def _serve(viewer: Viewer, host: str, port: int | None, browser: bool) -> int:
     try:
         _announce(viewer, host, port, browser)
         viewer.wait()

@@ -6,12 +6,12 @@ from .pose import PoseStyle as PoseStyle
 from .pose import draw_pose as draw_pose
 from .pose import pose_axes as pose_axes
 from .pose import pose_figure as pose_figure
+from .slices import WorkspaceSlice as WorkspaceSlice
+from .slices import workspace_slice as workspace_slice
 from .style import house_style as house_style
 from .style import new_figure as new_figure
 from .style import save as save
 from .trajectory import Envelope as Envelope
 from .trajectory import trajectory_figure as trajectory_figure
-from .workspace import WorkspaceSlice as WorkspaceSlice
 from .workspace import draw_slice as draw_slice
 from .workspace import workspace_figure as workspace_figure
-from .workspace import workspace_slice as workspace_slice

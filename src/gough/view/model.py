@@ -18,17 +18,19 @@ import numpy as np
 from gough.checks import Array
 from gough.errors import GoughError
 from gough.kinematics import leg_lengths, singularity_distance, strut_vectors
-from gough.limit_rules import in_workspace
 from gough.platform import Platform
 from gough.pose import Pose, pose_values
-from gough.skeleton import outside_stroke
+from gough.view.beyond import Beyond, beyond_limits
 from gough.view.follow import follow, step_solver
 
 if TYPE_CHECKING:
     from gough.fk.solve import Solver
+    from gough.margins import Reach
+    from gough.modes.result import AssemblyModes
 
 UNCHANGED = "The picture is unchanged; Undo resets the sliders."
 SHORTEST_STRUT = 1e-9  # / size; below it a strut has no direction
+SAME_POSE = 1e-7  # translation / size + rotation [rad] below which a mode is the picture's pose
 CLOSE = 0.2  # singularity distance / that of home; less deserves a warning
 UNDO_STEPS = 100
 
@@ -58,20 +60,28 @@ class Model:
     """One machine on the page.
 
     Attributes:
-        pose, legs: the pose in the picture, and its readings (6,).
+        pose, legs: the platform's pose in the picture, and its readings (6,).
+        view: the frame whose pose the page shows, such as "tool in work"; None for the platform.
         numbers: (6,) position [platform unit] and Euler angles [deg], R = Rx Ry Rz, of the last
-            request; those of `pose` unless it was not reached.
+            request, of the frame; those of `pose` unless it was not reached.
+        beyond: the limits that the pose in the picture exceeds.
         asked: (6,) readings of the last request; `legs` unless they were not reached.
         answer: its result.
     """
 
-    def __init__(self, platform: Platform, start: Pose | None = None) -> None:
-        """Show the machine at `start`, or at home.
+    def __init__(
+        self, platform: Platform, start: Pose | None = None, frame: str | None = None
+    ) -> None:
+        """Show the machine at the platform's pose `start`, or at home.
+
+        Args:
+            frame: whose pose the page shows; the platform's unless given.
 
         Raises:
-            GoughError: the legs cannot have the pose `start`.
+            GoughError: the legs cannot have the pose `start`, or there is no such frame.
         """
         self.platform = platform
+        self.view = platform.frame(frame) if frame else None
         self._home_distance = float(singularity_distance(platform, platform.home))
         self._earlier: deque[tuple[Pose, Array, Array]] = deque(maxlen=UNDO_STEPS)
         self.home()
@@ -96,18 +106,19 @@ class Model:
             self._show(found.pose, target, "forward kinematics", *known)
             return
         self.answer = Answer(False, f"{found.text} {UNCHANGED}", "forward kinematics", *known)
-        self.asked, self.numbers = target, pose_values(self.pose, "deg")
+        self.asked, self.numbers = target, self.values(self.pose)
 
     def ask_numbers(self, values: dict[int, float]) -> None:
         """Set some of x, y, z [platform unit] and rx, ry, rz [deg] (0 to 5); legs follow."""
         numbers = self.numbers.copy()
         numbers[list(values)] = list(values.values())
-        self.ask_pose(Pose.from_euler(numbers[:3], np.radians(numbers[3:])))
+        pose = Pose.from_euler(numbers[:3], np.radians(numbers[3:]))
+        self.ask_pose(pose if self.view is None else self.view.platform_pose(pose))
         # as requested: angles read back from the pose may be others of the same rotation
         self.numbers = numbers
 
     def ask_pose(self, pose: Pose) -> None:
-        """Go to a pose; the legs follow by inverse kinematics."""
+        """Go to a pose of the platform; the legs follow by inverse kinematics."""
         begin = time.perf_counter()
         legs = leg_lengths(self.platform, pose)
         seconds = time.perf_counter() - begin
@@ -116,7 +127,7 @@ class Model:
             self._show(pose, legs, "inverse kinematics", seconds=seconds)
             return
         self.answer = Answer(False, f"{problem} {UNCHANGED}", "inverse kinematics", seconds=seconds)
-        self.numbers, self.asked = pose_values(pose, "deg"), self.legs.copy()
+        self.numbers, self.asked = self.values(pose), self.legs.copy()
 
     def pick(self, pose: Pose, residual: float) -> None:
         """Take another assembly mode with the present readings."""
@@ -150,6 +161,23 @@ class Model:
         """Set all sliders to the pose in the picture."""
         self._show(self.pose, self.legs, "present pose")
 
+    # ---- compiled on first use --------------------------------------------------------
+
+    def compile(self) -> None:
+        """Compile, or load from disk, what the requests and the bars need."""
+        home, legs = self.platform.home, self.platform.home_legs
+        nowhere = np.full(6, 1e3 * self.platform.size)  # no pose has these: all restarts
+        for target in (legs, nowhere):
+            follow(self.solver, home, legs, target)
+        self.reach(home)
+
+    def reach(self, pose: Pose) -> Reach:
+        """Calculate how far each axis of the page's frame can still move from a pose."""
+        from gough.margins import reach
+
+        shown = pose if self.view is None else self.view.of(pose)
+        return reach(self.platform, shown, frame=self.frame or None)
+
     # ---- state ------------------------------------------------------------------------
 
     @cached_property
@@ -168,10 +196,22 @@ class Model:
         return self.singularity / self._home_distance if self._home_distance else np.nan
 
     @property
-    def within_limits(self) -> bool:
-        """True if the pose in the picture keeps the stated stroke and workspace."""
-        inside = bool(in_workspace(self.platform, self.pose))
-        return inside and not outside_stroke(self.platform, self.legs).any()
+    def frame(self) -> str:
+        """Name of the frame whose pose the page shows; "" for the platform's own."""
+        return "" if self.view is None else self.view.name
+
+    def mode(self, modes: AssemblyModes | None) -> int | None:
+        """Index of the assembly mode in the picture, or None."""
+        if modes is None or not len(modes.row):
+            return None
+        translation, rotation = modes.platform_pose.distance(self.pose)
+        gap = translation / self.platform.size + rotation
+        best = int(np.argmin(gap))
+        return best if gap[best] < SAME_POSE else None
+
+    def values(self, pose: Pose) -> Array:
+        """Position and Euler angles [deg], (..., 6), that the page shows for poses (...)."""
+        return pose_values(pose if self.view is None else self.view.of(pose), "deg")
 
     # ---- parts ------------------------------------------------------------------------
 
@@ -179,53 +219,15 @@ class Model:
         self, pose: Pose, legs: Array, how: str, residual=0.0, iterations=0, seconds=0.0
     ) -> None:
         self._take(pose, legs)
-        text = limits_text(self.platform, pose, legs)
+        text = self.beyond.text
         if self.singularity_share < CLOSE:
             text += " Close to a singularity: small reading errors become large pose errors."
         self.answer = Answer(True, text, how, residual, iterations, seconds)
 
     def _take(self, pose: Pose, legs: Array) -> None:
         self.pose, self.legs = pose, legs
-        self.numbers, self.asked = pose_values(pose, "deg"), legs.copy()
-
-
-def leg_factor(platform: Platform) -> float:
-    """Factor from readings to the numbers on the page, where motor angles are in degrees."""
-    return 180 / np.pi if platform.legs == "rotary" else 1.0
-
-
-def leg_unit(platform: Platform) -> str:
-    """Unit of the readings on the page."""
-    return "deg" if platform.legs == "rotary" else platform.unit
-
-
-def limits_text(platform: Platform, pose: Pose, legs: Array) -> str:
-    """Sentence that names the stated limits which a pose keeps, or those that it exceeds."""
-    beyond = _beyond_stroke(platform, legs)
-    if not in_workspace(platform, pose):
-        beyond.append("outside the stated workspace")
-    if beyond:
-        return f"Shown beyond its limits: {'; '.join(beyond)}."
-    stated = {"stroke": platform.stroke, "workspace": platform.workspace}
-    names = [name for name, limit in stated.items() if limit is not None]
-    return f"Within {' and '.join(names)}." if names else "The platform states no limits."
-
-
-def _beyond_stroke(platform: Platform, legs: Array) -> list[str]:
-    """Legs below and above their stroke, with the largest distance to its end."""
-    if platform.stroke is None:
-        return []
-    what = "motor" if platform.legs == "rotary" else "leg"
-    outside, parts = outside_stroke(platform, legs), []
-    low, high = platform.stroke.T
-    for side, miss in (("below", low - legs), ("above", legs - high)):
-        which = np.flatnonzero(outside & (miss > 0))
-        if len(which):
-            names = f"{what}{'s' * (len(which) > 1)} {', '.join(str(i + 1) for i in which)}"
-            most = f"{leg_factor(platform) * miss[which].max():.3g} {leg_unit(platform)}".rstrip()
-            limit = "its" if len(which) == 1 else "their"
-            parts.append(f"{names} {side} {limit} stroke by {'up to ' * (len(which) > 1)}{most}")
-    return parts
+        self.numbers, self.asked = self.values(pose), legs.copy()
+        self.beyond: Beyond = beyond_limits(self.platform, pose, legs)
 
 
 def _problem(platform: Platform, pose: Pose, legs: Array) -> str:

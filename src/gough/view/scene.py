@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.checks import Array
+from gough.frames import FramePose
 from gough.kinematics import joint_positions
 from gough.platform import Platform
 from gough.pose import Pose
-from gough.skeleton import outside_stroke
 from gough.view import meshes
+from gough.view.beyond import Beyond, beyond_limits
+from gough.view.ghosts import draw_modes
 
 if TYPE_CHECKING:
     import viser
@@ -29,9 +31,7 @@ VIEWS = {  # position of the camera, from the middle of the machine, and its upw
 BESIDE = 0.26  # translation of the picture to the left, for the panel / size
 GRID = 3.0  # width of the ground's grid / size
 GROUND, GROUND_FIFTH = "#DDE1E5", "#B9C0C7"  # lines of the grid
-# opacity of other modes: least, most, and the sum over all
-FAINT = 0.08, 0.35, 4.0
-DARKER = 0.6  # factor of their colours, since light from both sides brightens them
+FARTHEST = 2.0  # distance of a frame from the base's centre, beyond which it is not drawn / size
 
 
 class Scene:
@@ -45,6 +45,7 @@ class Scene:
         self,
         server: viser.ViserServer,
         platform: Platform,
+        view: FramePose | None = None,
         *,
         handle: bool = True,
         panel: bool = True,
@@ -52,6 +53,7 @@ class Scene:
         """Draw the machine at home.
 
         Args:
+            view: a frame whose axes, and those of the frame at rest, are drawn.
             handle: put a handle on the plate.
             panel: leave space for a panel on the right.
         """
@@ -66,21 +68,28 @@ class Scene:
             self._add_base()
             self._add_plate()
             self._add_legs()
+            if view is not None:
+                self._add_frames(view)
             self.handle = self._add_handle() if handle else None
         self.draw(platform.home, platform.home_legs)
 
     # ---- moving parts ----------------------------------------------------------------
 
-    def draw(self, pose: Pose, legs: Array, *, handle: bool = True) -> None:
-        """Show the machine at a pose with its readings (6,).
+    def draw(
+        self, pose: Pose, legs: Array, *, beyond: Beyond | None = None, handle: bool = True
+    ) -> None:
+        """Show the machine at a pose with its readings (6,); red where it exceeds its limits.
 
         Args:
+            beyond: these limits, where they are known.
             handle: move the handle, too; not while someone drags it.
         """
         parts = meshes.Limbs(
             *(self.frame.drawn(p) for p in meshes.limbs(self.platform, pose, legs))
         )
+        beyond = beyond or beyond_limits(self.platform, pose, legs)
         paint = meshes.leg_colors(self.platform, legs)
+        paint[beyond.legs] = meshes.rgb(meshes.OUT)
         place = self._plate_centre(pose)
         with self._server.atomic():
             self._plate.position, self._plate.wxyz = place, pose.wxyz
@@ -97,8 +106,14 @@ class Scene:
             self._thick.batched_colors = paint
             if self._elbows is not None:
                 self._elbows.batched_positions = _single(parts.thin_start)
-            for i, out in enumerate(outside_stroke(self.platform, legs)):
-                self._labels[i].text = f"{i + 1} outside stroke" if out else f"{i + 1}"
+            for balls, bent in zip(
+                self._balls, (beyond.base_joint, beyond.moving_joint), strict=True
+            ):
+                balls.batched_colors = np.where(
+                    bent[:, None], meshes.rgb(meshes.OUT), meshes.rgb(meshes.GREY)
+                ).astype(np.uint8)
+            for i, label in enumerate(self._labels):
+                label.text = f"{i + 1} {beyond.label(i)}".rstrip()
 
     def pose_of_handle(self, position: Array, wxyz: Array) -> Pose:
         """Pose at which the plate is where the handle is."""
@@ -117,43 +132,13 @@ class Scene:
     def show_modes(
         self, pose: Pose, legs: Array, sign: Array, pick: Callable[[int], None] | None
     ) -> None:
-        """Draw faint machines at poses (M,) with the same readings (6,).
-
-        Args:
-            sign: (M,) of det J relative to home's, which gives the colour.
-            pick: called with the index of a plate that is clicked.
-        """
+        """Draw faint machines at poses (M,) with the same readings (6,); see `draw_modes`."""
         self.clear_modes()
-        if not len(pose):
-            return
-        mesh = meshes.plate((self.platform.moving - self._hub) / self.frame.size, PLATE / 2)
-        same = np.asarray(sign)[:, None] > 0
-        least, most, together = FAINT
-        opacity = min(max(together / len(pose), least), most)
-        paint = np.where(same, meshes.rgb(meshes.SAME), meshes.rgb(meshes.OTHER))
-        paint = (DARKER * paint).astype(np.uint8)
-        places = np.stack([self._plate_centre(pose[i]) for i in range(len(pose))])
-        with self._server.atomic():
-            plates = self._server.scene.add_batched_meshes_simple(
-                "/modes/plates", mesh.vertices, mesh.faces, pose.wxyz, places,
-                batched_colors=paint, opacity=opacity, side="double",
-                flat_shading=True, cast_shadow=False, receive_shadow=False, lod="off",
-            )  # fmt: skip
-            joints = self.frame.drawn(joint_positions(self.platform, pose))
-            starts = self.frame.drawn(meshes.limbs(self.platform, pose[0], legs).thin_start)
-            lines = np.stack([np.broadcast_to(starts, joints.shape), joints], axis=2)
-            tint = np.repeat((paint * 0.45 + 255 * 0.55).astype(np.uint8), 12, axis=0)
-            rods = self._server.scene.add_line_segments(
-                "/modes/rods", lines.reshape(-1, 2, 3), tint.reshape(-1, 2, 3),
-                thickness=1.2, thickness_units="screen",
-            )  # fmt: skip
-        self._modes = [plates, rods]
-        if pick is not None:
-
-            @plates.on_click
-            def _(event: viser.SceneNodePointerEvent) -> None:
-                if event.instance_index is not None:
-                    pick(event.instance_index)
+        if len(pose):
+            places = np.stack([self._plate_centre(pose[i]) for i in range(len(pose))])
+            self._modes = draw_modes(
+                self._server, self.platform, self.frame, pose, legs, sign, places, pick
+            )
 
     def clear_modes(self) -> None:
         """Remove the faint machines."""
@@ -214,7 +199,7 @@ class Scene:
     def _add_base(self) -> None:
         base = self.frame.drawn(self.platform.base)
         self._add_slab("/base", base, meshes.BASE)
-        self._add_balls("/base/joints", base, meshes.GREY, 1.2 * JOINT)
+        self._balls = [self._add_balls("/base/joints", base, meshes.GREY, 1.2 * JOINT)]
         if self.platform.rotary is not None:
             axis = np.cross(self.platform.rotary.axis_x, self.platform.rotary.axis_y)
             ends = base - 0.03 * axis, base + 0.03 * axis
@@ -237,13 +222,33 @@ class Scene:
                 name, axes_length=length, axes_radius=0.003, origin_radius=0.006, position=place
             )
 
+    def _add_frames(self, view: FramePose) -> None:
+        """Draw and name the axes of a moving frame and of one at rest, if they are in view."""
+        moving, at_rest = view.name.split(" in ")
+        origin = (view.after.position - self._hub) / self.frame.size
+        rest = view.before.inverse()
+        for parent, name, place, wxyz in (
+            ("/plate", moving, origin, view.after.wxyz),
+            ("", at_rest, self.frame.drawn(rest.position), rest.wxyz),
+        ):
+            if np.linalg.norm(place) < FARTHEST:
+                node = f"{parent}/frame_{name}"
+                self._server.scene.add_frame(
+                    node, axes_length=0.12, axes_radius=0.004, origin_radius=0.008,
+                    position=place, wxyz=wxyz,
+                )  # fmt: skip
+                self._server.scene.add_label(
+                    f"{node}/name", name, position=(0.0, 0.0, 0.15), anchor="center-center",
+                    font_screen_scale=0.9,
+                )  # fmt: skip
+
     def _add_plate(self) -> None:
         moving = (self.platform.moving - self._hub) / self.frame.size
         self._plate = self._server.scene.add_frame(
             "/plate", axes_length=0.1, axes_radius=0.003, origin_radius=0.006
         )
         self._add_slab("/plate/slab", moving, meshes.PLATE)
-        self._add_balls("/plate/joints", moving, meshes.GREY, JOINT)
+        self._balls.append(self._add_balls("/plate/joints", moving, meshes.GREY, JOINT))
 
     def _add_legs(self) -> None:
         nowhere = np.zeros((6, 3)), np.tile([0.0, 0.0, 1.0], (6, 1))

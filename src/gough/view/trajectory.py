@@ -15,8 +15,9 @@ from gough.files.rows import Reading
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.status import Status
+from gough.view.beyond import beyond_limits
 from gough.view.follow import REFUSED, has_pose
-from gough.view.model import Answer, limits_text
+from gough.view.model import Answer
 
 ROWS_A_SECOND = 30.0  # at which a file without times is played
 
@@ -31,8 +32,9 @@ class Trajectory:
         number: (N,) rows' numbers in the file, from 1.
         total: rows in the file.
         time: (N,) [s], rising; from the file if `timed`, else 30 rows of the file a second.
-        pose: batch (N,). legs: (N, 6). NaN where there is none.
+        pose: batch (N,), of the platform. legs: (N, 6). NaN where there is none.
         answers: result of each row.
+        frame: whose poses the file holds, such as "tool in work"; None for the platform's.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Trajectory:
     pose: Pose
     legs: Array
     answers: list[Answer]
+    frame: str | None = None
 
     def __len__(self) -> int:
         return len(self.number)
@@ -115,6 +118,7 @@ def read(
     rows: int,
     time: str | None = None,
     reading: Reading = Reading(),
+    frame: str | None = None,
 ) -> Trajectory:
     """Read a file of poses or of leg readings; of one that holds both, the poses.
 
@@ -124,6 +128,7 @@ def read(
         rows: largest number of rows kept, evenly spread over the file.
         time: a column of rising times [s].
         reading: options for reading the file.
+        frame: whose poses the file holds; those that it states, or the platform's, unless given.
 
     Raises:
         GoughError, InputError: fewer than two rows wanted, or an error in the file.
@@ -131,7 +136,7 @@ def read(
     if rows < 2:
         raise GoughError(f"--rows {rows}: expected 2 or more")
     thin = Thin(rows)
-    with files.open_trajectory(path, platform, time=time, reading=reading) as file:
+    with files.open_trajectory(path, platform, time=time, reading=reading, frame=frame) as file:
         time = file.time
         for block in file.blocks():
             thin.add(block)
@@ -146,7 +151,7 @@ def read(
     ]
     return Trajectory(
         Path(path).name, of, found.number, thin.total, clock, time is not None, found.pose,
-        found.legs, answers,
+        found.legs, answers, frame if file.frame is None else file.frame.name,
     )  # fmt: skip
 
 
@@ -154,7 +159,7 @@ def _reached(platform: Platform, rows: files.Trajectory, i: int) -> tuple[bool, 
     """True with the limits of a row's pose; False with the reason why it has none."""
     status = rows.outcomes[i]
     if has_pose(status):
-        text = limits_text(platform, rows.pose[i], rows.legs[i])
+        text = beyond_limits(platform, rows.pose[i], rows.legs[i]).text
         return True, text if status.usable else f"Marked {status.label}. {text}"
     forward = isinstance(status, Status)
     return False, REFUSED[status.label] if forward else status.text

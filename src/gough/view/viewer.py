@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +13,12 @@ from gough.platform import Platform
 from gough.pose import Pose
 from gough.view.export import page
 from gough.view.model import Model
-from gough.view.panel import FIND, Panel
+from gough.view.panel import Panel
+from gough.view.player import Player
+from gough.view.requests import Pace, RequestQueue
 from gough.view.scene import Scene
 from gough.view.server import close_server, open_server
+from gough.view.tabs import FIND
 from gough.view.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -24,9 +26,8 @@ if TYPE_CHECKING:
 
     from gough.modes.result import AssemblyModes
 
-SAME_POSE = 1e-7  # translation / size + rotation [rad] below which a mode is the picture's pose
 PANEL_PERIOD = 1 / 20  # [s] between changes of the panel's numbers
-FRAME = 1 / 60  # [s] between rows of a file
+REACH_PERIOD = 1 / 10  # [s] between changes of the bars, which take some milliseconds
 BROWSER_WAIT = 2.0  # [s] for a browser to draw before the solver is compiled
 UNDO_PAUSE = 1.0  # [s] without a request, after which Undo counts a new move
 COMPILING = (
@@ -35,31 +36,7 @@ COMPILING = (
 )
 SEARCHING = "Searching for all poses with these readings (compiled on first use: some seconds) ..."
 OUTDATED = f"The readings have changed since the modes were found: press “{FIND}”."
-CONTINUOUS = ("legs", "numbers", "drag", "row", "tick")  # only the newest request counts
 MOVES = ("legs", "numbers", "drag", "home", "pick")  # requests that Undo takes back
-
-
-class RequestQueue:
-    """Requests from the page that are not handled yet; of a dragged slider, the newest only."""
-
-    def __init__(self) -> None:
-        self._queue: deque[tuple[str, dict]] = deque()
-        self._changed = threading.Condition()
-
-    def post(self, kind: str, values: dict) -> None:
-        """Add a request; a continuous one is merged with the same kind at the end of the queue."""
-        with self._changed:
-            if kind in CONTINUOUS and self._queue and self._queue[-1][0] == kind:
-                self._queue[-1][1].update(values)
-            else:
-                self._queue.append((kind, dict(values)))
-            self._changed.notify()
-
-    def get(self, timeout: float | None) -> tuple[str, dict] | None:
-        """Return the next request, or None after `timeout` seconds without one."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._queue, timeout)
-            return self._queue.popleft() if self._queue else None
 
 
 class Viewer:
@@ -73,22 +50,28 @@ class Viewer:
         port: int | None = None,
         trajectory: Trajectory | None = None,
         start: Pose | None = None,
+        frame: str | None = None,
     ) -> None:
         """Draw the machine at `start` or at home, and compile the solver in the background.
 
+        Args:
+            start: a pose of the platform.
+            frame: whose pose the page shows and takes, such as "tool in work".
+
         Raises:
-            GoughError: the port is taken.
+            GoughError: the port is taken, or there is no such frame.
         """
         self.platform, self.trajectory = platform, trajectory
-        self.model = Model(platform, start)
+        self.model = Model(platform, start, frame)
         self.server = open_server(host, port, f"gough · {platform.name}")
         self._requests = RequestQueue()
-        self.scene = Scene(self.server, platform)
-        self.panel = Panel(self.server, platform, self._requests.post, trajectory)
+        self.scene = Scene(self.server, platform, self.model.view)
+        self.panel = Panel(self.server, self.model, self._requests.post, trajectory)
         self._note, self._ready, self._dragging = COMPILING, False, False
         self._modes: AssemblyModes | None = None
         self._last_move = "", 0.0
-        self._row, self._playing, self._speed = 0, False, 1.0
+        self._player = Player(trajectory)
+        self._reached: Pose | None = None  # the pose that the bars are those of
         self._failure: BaseException | None = None
         self._connected = threading.Event()
         self.server.on_client_connect(lambda _: self._connected.set())
@@ -115,7 +98,7 @@ class Viewer:
 
     def close(self) -> None:
         """End the server and its threads; compiling is waited for."""
-        self._playing = False
+        self._player.playing = False
         self._requests.post("close", {})
         self._worker.join()
         close_server(self.server)
@@ -137,9 +120,12 @@ class Viewer:
 
     def _work(self) -> None:
         """Handle requests, one after the other."""
-        shown, stale = 0.0, False
+        # the picture moves more often than numbers can be read
+        paces = (Pace(PANEL_PERIOD), self._show_panel), (Pace(REACH_PERIOD), self._show_reach)
         while True:
-            request = self._requests.get(PANEL_PERIOD if stale else None)
+            now = time.monotonic()
+            waits = [wait for pace, _ in paces if (wait := pace.wait(now)) is not None]
+            request = self._requests.get(min(waits, default=None))
             if request is not None:
                 kind, values = request
                 if kind == "close":
@@ -147,11 +133,11 @@ class Viewer:
                 self._remember(kind)
                 getattr(self, f"_on_{kind}")(values)
                 self._draw()
-            # the picture moves more often than numbers can be read
-            stale = request is not None and time.monotonic() - shown < PANEL_PERIOD
-            if not stale:
-                self._show_panel()
-                shown = time.monotonic()
+                for pace, _ in paces:
+                    pace.ask()
+            for pace, work in paces:
+                if pace.start(time.monotonic()):
+                    work()
 
     def _remember(self, kind: str) -> None:
         """Keep the pose for Undo where a new move begins."""
@@ -164,65 +150,46 @@ class Viewer:
 
     def _prepare(self) -> None:
         """Compile the solver, once the browser has drawn the first picture."""
-        from gough.view.follow import follow
-
         self._connected.wait(BROWSER_WAIT)
-        home, legs = self.platform.home, self.platform.home_legs
-        nowhere = np.full(6, 1e3 * self.platform.size)  # no pose has these: all restarts
-        for target in (legs, nowhere):
-            follow(self.model.solver, home, legs, target)
+        self.model.compile()
         self._requests.post("ready", {})
-
-    def _play(self) -> None:
-        """Post rows at the speed of the player, until the last."""
-        assert self.trajectory is not None
-        times = self.trajectory.time
-        if self._row >= len(times) - 1:
-            self._row = 0
-        now, last = float(times[self._row]), time.monotonic()
-        while self._playing and now < times[-1]:
-            time.sleep(FRAME)
-            begin, last = last, time.monotonic()
-            now += self._speed * (last - begin)
-            if self._playing:
-                row = int(np.searchsorted(times, now, side="right")) - 1
-                self._requests.post("tick", {"row": max(0, row)})
-        self._requests.post("pause", {})
 
     def _find(self, legs: np.ndarray) -> None:
         from gough.modes.assembly import assembly_modes
 
-        self._requests.post("found", {"modes": assembly_modes(self.platform, legs)})
+        found = assembly_modes(self.platform, legs, frame=self.model.frame or None)
+        self._requests.post("found", {"modes": found})
 
     # ---- requests ---------------------------------------------------------------------
 
     def _on_ready(self, _: dict) -> None:
         self._note, self._ready = "", True
         self.panel.enable(True)
+        self.panel.show_reach(self.model.reach(self.platform.home), home=True)
 
     def _on_legs(self, readings: dict) -> None:
         if self._ready:
-            self._playing = False
+            self._player.playing = False
             self.model.ask_legs(readings)
 
     def _on_numbers(self, values: dict) -> None:
-        self._playing = False
+        self._player.playing = False
         self.model.ask_numbers(values)
 
     def _on_drag(self, what: dict) -> None:
-        self._playing, self._dragging = False, True
+        self._player.playing, self._dragging = False, True
         self.model.ask_pose(self.scene.pose_of_handle(what["position"], what["wxyz"]))
 
     def _on_drop(self, _: dict) -> None:
         self._dragging = False
 
     def _on_home(self, _: dict) -> None:
-        self._playing = False
+        self._player.playing = False
         self.model.home()
         self.panel.reset_ranges()
 
     def _on_undo(self, _: dict) -> None:
-        self._playing, self._last_move = False, ("", 0.0)
+        self._player.playing, self._last_move = False, ("", 0.0)
         self.model.undo()
 
     def _on_handle(self, _: dict) -> None:
@@ -251,32 +218,32 @@ class Viewer:
         self._modes = modes
         self.panel.modes.show(modes)
         pick = lambda index: self._requests.post("pick", {"mode": index})  # noqa: E731
-        self.scene.show_modes(modes.pose, modes.legs, modes.sign, pick)
+        self.scene.show_modes(modes.platform_pose, modes.legs, modes.sign, pick)
 
     def _on_pick(self, what: dict) -> None:
         if self._modes is not None:
             index = what["mode"]
-            pose, residual = self._modes.pose[index], float(self._modes.residual[index])
+            pose, residual = self._modes.platform_pose[index], float(self._modes.residual[index])
             self.model.pick(pose, residual)
 
     def _on_row(self, what: dict) -> None:
-        self._playing = False
+        self._player.playing = False
         self._show_row(what)
 
     def _on_tick(self, what: dict) -> None:
-        if self._playing:  # else it has been paused meanwhile
+        if self._player.playing:  # else it has been paused meanwhile
             self._show_row(what)
 
     def _on_play(self, _: dict) -> None:
-        self._playing = not self._playing
-        if self._playing:
-            self._start(self._play)
+        self._player.playing = not self._player.playing
+        if self._player.playing:
+            self._start(self._player.run, self._requests.post)
 
     def _on_pause(self, _: dict) -> None:
-        self._playing = False
+        self._player.playing = False
 
     def _on_speed(self, what: dict) -> None:
-        self._speed = what["speed"]
+        self._player.speed = what["speed"]
 
     def _on_save(self, what: dict) -> None:
         self._start(self._save, what["client"])
@@ -290,7 +257,7 @@ class Viewer:
 
     def _show_row(self, what: dict) -> None:
         assert self.trajectory is not None
-        self._row = i = what["row"]
+        self._player.row = i = what["row"]
         rows = self.trajectory
         self.model.show(rows.pose[i], rows.legs[i], rows.answers[i])
 
@@ -300,24 +267,23 @@ class Viewer:
             self._modes = None
             self.scene.clear_modes()
             self.panel.modes.clear(OUTDATED)
-        self.scene.draw(self.model.pose, self.model.legs, handle=not self._dragging)
+        model = self.model
+        dragged = self._dragging
+        self.scene.draw(model.pose, model.legs, beyond=model.beyond, handle=not dragged)
 
     def _show_panel(self) -> None:
         """Show the model's numbers."""
-        self.panel.modes.mark(self._shown_mode())
+        self.panel.modes.mark(self.model.mode(self._modes))
         with self.server.atomic():
             self.panel.show(self.model, self._note)
             if self.panel.player is not None:
-                self.panel.player.show(self._row, self._playing)
+                self.panel.player.show(self._player.row, self._player.playing)
 
-    def _shown_mode(self) -> int | None:
-        """Index of the mode in the picture, or None."""
-        if self._modes is None or not len(self._modes.row):
-            return None
-        translation, rotation = self._modes.pose.distance(self.model.pose)
-        gap = translation / self.platform.size + rotation
-        best = int(np.argmin(gap))
-        return best if gap[best] < SAME_POSE else None
+    def _show_reach(self) -> None:
+        """Show how far each axis can still move, once that is compiled."""
+        if self._ready and self._reached is not self.model.pose:
+            self._reached = self.model.pose
+            self.panel.show_reach(self.model.reach(self.model.pose))
 
     def _listen_to_handle(self) -> None:
         handle = self.scene.handle
