@@ -1,4 +1,4 @@
-"""Margins of poses to the limits of their machine, beside coal and MuJoCo; and how fast they are.
+"""Frames beside SciPy and pytransform3d; margins of poses beside coal and MuJoCo, and their speed.
 
 python benchmarks/limits.py                 # a few minutes
 python benchmarks/limits.py --poses 1000    # of each machine, against coal and MuJoCo
@@ -35,9 +35,10 @@ REACH_POSES = 200
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--poses", type=int, default=100_000)
-    parser.add_argument("--only", default="coal,mujoco,reach,speed")
+    parser.add_argument("--only", default="frames,coal,mujoco,reach,speed")
     given = parser.parse_args()
-    parts = {"coal": clearance, "mujoco": joints_and_forces, "reach": first_limit, "speed": speed}
+    parts = {"frames": chains, "coal": clearance, "mujoco": joints_and_forces,
+             "reach": first_limit, "speed": speed}  # fmt: skip
     for name in given.only.split(","):
         parts[name](given.poses)
 
@@ -55,6 +56,59 @@ def limited(platform: Platform) -> Platform:
         base_joint_cone=60, moving_joint_cone=70, leg_radius=0.2 * gaps.min(),
         leg_force=(-most, most), payload=load, leg_speed=1.0,
     ))  # fmt: skip
+
+
+# ---- frames ---------------------------------------------------------------------------
+
+
+def chains(count: int) -> None:
+    """Poses of a tip on a tool in a room on a work piece, beside compositions by others."""
+    from pytransform3d.batch_rotations import matrices_from_quaternions
+    from scipy.spatial.transform import RigidTransform, Rotation
+
+    rng = np.random.default_rng(0)
+    names = ("base_in_world", "tool_in_platform", "tip_in_tool", "work_in_world", "room_in_work")
+    poses = {name: Pose(rng.normal(size=3), rng.normal(size=4)) for name in names}
+    machine = replace(Platform.load("reference"), pivot=(0.3, -0.2, 0.5)).with_frames(poses)
+    pose = Pose(rng.normal(size=(count, 3)), rng.normal(size=(count, 4)))
+    view = machine.frame("tip in room")
+    found = view.of(pose).matrix
+
+    def scipy(p: Pose) -> RigidTransform:
+        return RigidTransform.from_components(
+            p.position, Rotation.from_quat(p.wxyz, scalar_first=True)
+        )
+
+    def matrices(p: Pose) -> np.ndarray:
+        out = np.tile(np.eye(4), (*p.batch, 1, 1))
+        out[..., :3, :3] = matrices_from_quaternions(p.wxyz, normalize_quaternions=True)
+        out[..., :3, 3] = p.position
+        return out
+
+    shift = Pose(machine.pivot_point)
+    chain = [poses["room_in_work"], poses["work_in_world"]], [poses["base_in_world"], shift]
+    rest = [poses["tool_in_platform"], poses["tip_in_tool"]]
+    by_scipy = scipy(Pose.identity())
+    by_matrices = np.eye(4)
+    for p in chain[0]:
+        by_scipy, by_matrices = by_scipy * scipy(p).inv(), by_matrices @ np.linalg.inv(matrices(p))
+    for p in [*chain[1], pose]:
+        by_scipy, by_matrices = by_scipy * scipy(p), by_matrices @ matrices(p)
+    by_scipy, by_matrices = (
+        by_scipy * scipy(shift).inv(),
+        by_matrices @ np.linalg.inv(matrices(shift)),
+    )
+    for p in rest:
+        by_scipy, by_matrices = by_scipy * scipy(p), by_matrices @ matrices(p)
+    scale = np.abs(found).max(axis=(-2, -1))
+    print(f"| {count:,} poses of a frame, composed by | largest difference / largest number |\n"
+          "|---|---|")  # fmt: skip
+    for name, other in (("SciPy", by_scipy.as_matrix()), ("pytransform3d", by_matrices)):
+        apart = np.abs(other - found).max(axis=(-2, -1)) / scale
+        print(f"| {name} | {apart.max():.1e} |")
+    back = view.platform_pose(view.of(pose))
+    length, angle = back.distance(pose)
+    print(f"| there and back | {max((length / scale).max(), angle.max()):.1e} |\n", flush=True)
 
 
 # ---- coal -----------------------------------------------------------------------------

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +16,7 @@ import gough
 from gough.plot import WorkspaceSlice, new_figure, workspace_figure, workspace_slice
 from gough.plot.slices import COORDINATES
 from gough.plot.style import VERMILION
-from gough.plot.workspace import draw_slice
+from gough.plot.workspace import _regions, draw_slice
 
 MACHINES = gough.Platform.catalog()
 
@@ -149,3 +152,65 @@ def test_a_slice_holds_home_and_the_stated_workspace(name, axis):
 def test_wrong_slices_are_explained(options, words):
     with pytest.raises(gough.GoughError, match=words):
         workspace_slice(gough.Platform.load("reference"), **options)
+
+
+def limited() -> gough.Platform:
+    """The reference platform with limits of each kind and a tool."""
+    limits = gough.MachineLimits(
+        base_joint_cone=12, leg_radius=20, clearance=20, leg_force=(-50, 400), leg_speed=100,
+        payload=gough.Payload(30, (0, 0, 80)),
+    )  # fmt: skip
+    return replace(gough.Platform.load("reference"), limits=limits).with_frames(
+        {"tool_in_platform": [0, 0, 90], "work_in_base": [0, 0, 500]}
+    )
+
+
+@pytest.mark.parametrize("frame", [None, "tool in work"])
+def test_quantities_are_those_of_the_library(frame):
+    platform = limited()
+
+    def of(name: str) -> Callable[[gough.Pose, gough.Pose], float]:
+        return {
+            "margin": lambda own, _: gough.limits(platform, own).tightest,
+            "force": lambda own, _: np.abs(gough.payload_forces(platform, own)).max(),
+            "stiffness": lambda _, p: gough.softest_stiffness(platform, p, 1.0, frame),
+            "speed": lambda _, p: gough.top_speeds(platform, p, 100.0, frame)[0],
+            "error": lambda _, p: np.sqrt(np.linalg.eigvalsh(
+                gough.pose_covariance(platform, p, 1.0, frame)[:3, :3])[-1]),
+        }[name]  # fmt: skip
+
+    for name in ("margin", "force", "stiffness", "speed", "error"):
+        cut = workspace_slice(platform, ("x", "ry"), resolution=5, quantity=name, frame=frame)
+        pose = pose_at(cut, cut.u[3], cut.v[1])
+        own = platform.frame(frame).platform_pose(pose) if frame else pose
+        np.testing.assert_allclose(cut.values[1, 3], of(name)(own, pose), rtol=1e-9)
+        np.testing.assert_allclose(
+            cut.distance[1, 3], gough.singularity_distance(platform, own), atol=1e-12
+        )
+
+
+def test_the_limit_that_ends_a_slice_is_hatched_and_named():
+    platform = limited()
+    cut = workspace_slice(platform, ("x", "y"), span=(-300, 300, -300, 300), resolution=41)
+    regions = _regions(cut.limits, np.minimum.reduce(list(cut.limits.values())))
+    assert "base joint" in regions
+    kinds = ("stroke", "base joint", "platform joint", "clearance", "leg force")
+    for i, j in ((0, 0), (20, 35), (40, 3)):
+        pose = pose_at(cut, cut.u[j], cut.v[i])
+        found = gough.limits(platform, pose)
+        shares = {k: s for k, s in zip(found.names, found.share, strict=True) if k in kinds}
+        worst = min(shares, key=lambda k: shares[k])
+        if shares[worst] < 0 and worst != "stroke":
+            assert regions[worst][i, j] < 0
+    figure = workspace_figure(cut)
+    texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert "edge of all limits" in texts
+    assert "beyond the limit: base joint" in texts
+
+
+def test_an_unknown_quantity_lists_those_there_are_and_forces_need_a_payload():
+    platform = gough.Platform.load("reference")
+    with pytest.raises(gough.GoughError, match="did you mean 'margin'"):
+        workspace_slice(platform, quantity="margn", resolution=3)
+    with pytest.raises(gough.GoughError, match="payload"):
+        workspace_slice(platform, quantity="force", resolution=3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,9 +13,11 @@ from gough.pose import pose_values
 from gough.skeleton import outside_stroke
 from gough.units import scaled
 from gough.view import meshes
-from gough.view.beyond import leg_factor
+from gough.view.beyond import beyond_limits, leg_factor
 from gough.view.follow import BLOCKED, REFUSED, follow, has_pose, step_solver
 from gough.view.model import UNCHANGED, Answer, Model
+from gough.view.reach_bars import reach_html
+from gough.view.requests import Pace
 from gough.view.sliders import leg_ranges, pose_ranges
 
 CATALOG = Platform.catalog()
@@ -286,7 +290,7 @@ def test_a_pose_beyond_its_limits_is_shown_and_the_limits_are_named():
     model.ask_legs({4: 0.0145})
     assert model.answer.reached
     assert model.answer.text.startswith("Shown beyond its limits: leg 5 above its stroke by ")
-    assert not model.within_limits
+    assert not model.beyond.ok
     assert Model(Platform.load("dietmaier")).answer.text == "Within workspace."
 
 
@@ -307,3 +311,79 @@ def test_undo_goes_back_move_by_move():
     assert model.pose is model.platform.home
     model.undo()
     assert model.pose is model.platform.home
+
+
+def limited(**given) -> Platform:
+    """The reference platform with further limits."""
+    return replace(Platform.load("reference"), limits=gough.MachineLimits(**given))
+
+
+def test_legs_that_touch_are_named_and_red():
+    """Two legs whose axes are as near as their radii allow at home touch after a rotation."""
+    gaps = gough.leg_gaps(Platform.load("reference"), Platform.load("reference").home)
+    model = Model(limited(leg_radius=0.49 * gaps.min(), clearance=0.0))
+    assert model.answer.text.startswith("Within")
+    model.ask_numbers({5: 40.0})
+    found = gough.limits(model.platform, model.pose)
+    assert "clearance" in found.limit
+    a, b = found.limit.split(":")[0].removeprefix("legs ").split(" and ")
+    assert f"legs {a} and {b} touch" in model.answer.text
+    np.testing.assert_array_equal(model.beyond.near, found.legs)
+    assert model.beyond.label(int(a) - 1) == "too near"
+    assert not model.beyond.ok
+
+
+def test_each_limit_that_is_exceeded_is_named():
+    load = gough.Payload(30.0, (0, 0, 80))
+    platform = limited(base_joint_cone=2, moving_joint_cone=2, leg_force=(40, 70), payload=load)
+    model = Model(platform)
+    model.ask_numbers({0: 60.0, 3: 10.0})
+    found = gough.limits(platform, model.pose)
+    np.testing.assert_array_equal(model.beyond.legs, found.legs)
+    for text in ("base joint", "platform joint", "beyond their cone by", "beyond the leg force"):
+        assert text in model.answer.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_beyond_a_limit_is_what_limits_says(seed):
+    load = gough.Payload(30.0, (0, 0, 80))
+    platform = limited(base_joint_cone=8, moving_joint_cone=12, leg_radius=20, clearance=30,
+                       leg_force=(-20, 150), payload=load)  # fmt: skip
+    poses = platform.with_workspace(100, 30).sample_poses(30, seed)
+    found = gough.limits(platform, poses)
+    for i in range(30):
+        seen = beyond_limits(platform, poses[i], gough.leg_lengths(platform, poses[i]))
+        np.testing.assert_array_equal(seen.legs, found.legs[i])
+
+
+def test_the_page_of_a_frame_shows_and_takes_its_poses():
+    frames = {
+        "tool_in_platform": [0, 0, 90],
+        "work_in_world": gough.Pose.from_euler([0, 50, 600], [0, 0, 1]),
+    }
+    platform = limited(leg_radius=5).with_frames(frames)
+    model = Model(platform, frame="tool in work")
+    view = platform.frame("tool in work")
+    model.ask_numbers({0: model.numbers[0] + 3.0, 4: 5.0})
+    shown = view.of(model.pose)
+    np.testing.assert_allclose(model.numbers[:3], shown.position, atol=1e-9)
+    np.testing.assert_allclose(model.numbers[3:], np.degrees(shown.euler), atol=1e-9)
+    legs = gough.leg_lengths(platform, shown, "tool in work")
+    np.testing.assert_allclose(model.legs, legs, atol=1e-9)
+    expected = gough.reach(platform, shown, frame="tool in work")
+    np.testing.assert_array_equal(model.reach(model.pose).distance, expected.distance)
+    html = reach_html(expected, np.ones(6), 2)
+    assert html.count("<i>") == 12
+    assert str(expected.limit[0, 0]) in html
+
+
+def test_work_is_done_at_most_once_in_its_period():
+    pace = Pace(1.0)
+    assert pace.wait(5.0) is None
+    pace.ask()
+    assert pace.start(5.0)
+    assert not pace.start(5.0)
+    pace.ask()
+    assert pace.wait(5.25) == 0.75
+    assert not pace.start(5.25)
+    assert pace.start(6.0)

@@ -126,13 +126,13 @@ def _limits(axes: Axes, cut: WorkspaceSlice) -> None:
 
 def _regions(limits: Mapping[str, Array], worst: Array) -> dict[str, Any]:
     """Masked values (m, n) of the limits that end the slice, below 0 where each is broken most."""
+    broken = {name: left for name, left in limits.items() if np.any((left < 0) & (left == worst))}
     if len(limits) == 1:
-        regions = {name: np.ma.masked_invalid(left) for name, left in limits.items()}
-    else:  # the regions of several limits meet between two poses
-        regions = {
-            name: np.where((left < 0) & (left == worst), -1.0, 1.0) for name, left in limits.items()
-        }
-    return {name: region for name, region in regions.items() if np.nanmin(region, initial=0) < 0}
+        return {name: np.ma.masked_invalid(left) for name, left in broken.items()}
+    # the regions of several limits meet between two poses
+    return {
+        name: np.where((left < 0) & (left == worst), -1.0, 1.0) for name, left in broken.items()
+    }
 
 
 def _zero(axes: Axes, cut: WorkspaceSlice, values: Array, **look: Any) -> None:
