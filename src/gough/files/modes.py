@@ -30,6 +30,7 @@ def modes_file(
     *,
     reading: Reading = Reading(),
     workers: int | None = None,
+    frame: str | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Find every pose of every row of a file of leg readings.
@@ -41,6 +42,7 @@ def modes_file(
         platform: the machine.
         reading: options for reading the file.
         workers: number of threads; all cores unless given.
+        frame: whose poses are written, such as "tool in work"; the platform's unless given.
         progress: called after every block with the file and the counts so far.
 
     Returns:
@@ -52,13 +54,13 @@ def modes_file(
     report = Report(tuple(ModesStatus))
     before = legs.before if isinstance(legs, FilePart) else 0
     reading = replace(reading, block_rows=min(reading.block_rows, SETS))
-    with open_job(legs, out, platform, reading, file_leg_columns, ()) as job:
+    with open_job(legs, out, platform, reading, file_leg_columns, (), frame) as job:
         for block in job.blocks:
             readings = block.numbers(LEGS)
             if report.rows == 0:
                 check_plausible(job.source, platform, readings)
                 report.start()
-            modes = assembly_modes(platform, readings, workers=workers)
+            modes = assembly_modes(platform, readings, workers=workers, frame=frame)
             found = mode_table(modes, choose_mode(modes), before + report.rows)
             report.count(modes.status)
             invalid = modes.status == ModesStatus.INVALID_INPUT
