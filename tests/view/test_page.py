@@ -21,6 +21,7 @@ from gough.view.viewer import Viewer
 from .conftest import Tab
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rubin_camera_legs.csv"
+CELL = Path(__file__).parents[2] / "examples" / "cell.toml"
 Show = Callable[..., Viewer]
 
 
@@ -296,3 +297,21 @@ def test_an_exported_trajectory_plays_offline(tab: Tab, tmp_path: Path):
     tab.page.get_by_text(trajectory.where(row)).wait_for()
     cells = tab.page.locator("[data-gough=numbers] td")
     assert float(cells.nth(1).inner_text()) == pytest.approx(trajectory.legs[row, 0], abs=1e-6)
+
+
+def test_a_frame_shows_what_is_left_in_it_and_names_legs_that_touch(show: Show, tab: Tab):
+    viewer = show(str(CELL), frame="tool in work")
+    tab.await_ready()
+    bars = tab.page.locator("[data-gough=reach]", has_text="about z")
+    bars.wait_for()
+    before = bars.inner_text()
+    assert "leg 1: stroke" in before
+    tab.number(9).fill("40")  # rx
+    tab.await_status("Shown beyond its limits: legs 2 and 3 touch")
+    tab.page.wait_for_function(
+        "t => document.querySelector('[data-gough=reach]').innerText != t", arg=before
+    )
+    assert "legs 2 and 3: clearance" in bars.inner_text()
+    tab.shot("touching")
+    shown = viewer.platform.frame("tool in work").of(viewer.model.pose)
+    np.testing.assert_allclose(np.degrees(shown.euler[0]), 40, atol=1e-9)

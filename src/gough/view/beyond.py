@@ -77,17 +77,17 @@ def beyond_limits(platform: Platform, pose: Pose, legs: Array) -> Beyond:
     """Compare one pose and its readings (6,) with every limit that the machine states."""
     limits = platform.limits or MachineLimits()
     stroke = outside_stroke(platform, legs)
-    parts = _stroke(platform, legs, stroke)
+    parts: list[str] = []
     cones = (limits.base_joint_cone, limits.moving_joint_cone)
     base = moving = near = force = np.zeros(6, bool)
+    if limits.leg_radius is not None:
+        near, parts = _near(platform, limits, pose)
+    parts += _stroke(platform, legs, stroke)
     if any(cone is not None for cone in cones):
         angles = joint_angles(platform, pose)
         base, moving = (_above(a, c) for a, c in zip(angles, cones, strict=True))
         parts += _bent("base", angles[0], cones[0], base)
         parts += _bent("platform", angles[1], cones[1], moving)
-    if limits.leg_radius is not None:
-        near, said = _near(platform, limits, pose)
-        parts += said
     if limits.leg_force is not None:
         forces, (low, high) = payload_forces(platform, pose), limits.leg_force.T
         slack = SLACK * np.max(np.abs(limits.leg_force))
