@@ -82,12 +82,13 @@ def legend(platform: Platform) -> str:
     ramp = ", ".join(meshes.RAMP)
     low, high = ("lowest", "highest") if platform.legs == "rotary" else ("shortest", "longest")
     flat = "height:0.6em;border-radius:2px"
+    red = "outside stroke" if platform.limits is None else "beyond a limit"
     return (
         f"{DARK}<div style='{SMALL};margin:0.2em 0.95em;display:flex;align-items:center;gap:0.5em'>"
         f"<span>{low}</span><span style='flex:1;{flat};"
         f"background:linear-gradient(90deg, {ramp})'></span><span>{high}</span>"
         f"<span style='width:1.6em;{flat};background:{meshes.OUT}'></span>"
-        f"<span>outside stroke</span></div>"
+        f"<span>{red}</span></div>"
     )
 
 

@@ -21,6 +21,8 @@ RAMP = (BLUE, GREEN, YELLOW)  # lowest, middle and highest reading of a stroke
 OUT = "#D1001C"  # outside the stroke: red, and darker than any colour of the ramp
 SAME, OTHER = BLUE, VERMILION  # det J with home's sign, or with the other; as `gough plot modes`
 
+THICK, THIN = 0.014, 0.0075  # radii of a leg's two parts / size, where none is stated
+ROD = 0.9  # radius of the thin part / stated radius, which is that of both
 TUBE = 0.55  # length of a telescopic leg's outer tube / length of the leg at home
 LONGEST_TUBE = 0.8  # the same / present length of the leg
 LABEL_GAP = 0.09  # smallest distance between labels, and from their joints / size
@@ -70,6 +72,14 @@ class Limbs(NamedTuple):
     thin_end: Array
 
 
+def leg_radii(platform: Platform) -> tuple[Array, Array]:
+    """Radii (6,) of the thick and of the thin parts as drawn: as stated, if they are."""
+    stated = None if platform.limits is None else platform.limits.leg_radius
+    if stated is None:
+        return np.full(6, THICK), np.full(6, THIN)
+    return stated / platform.size, ROD * stated / platform.size
+
+
 def limbs(platform: Platform, pose: Pose, legs: Array) -> Limbs:
     """Parts of the legs at a pose with readings (6,), in base coordinates [platform unit]."""
     points = skeleton(platform, pose, legs)
@@ -99,8 +109,12 @@ def leg_colors(platform: Platform, legs: Array) -> NDArray[np.uint8]:
     return np.round(colors).astype(np.uint8)
 
 
-def rods_between(starts: Array, ends: Array, radius: float) -> tuple[Array, Array, Array]:
-    """Positions (N, 3), quaternions (N, 4) and scales (N, 3) of unit cylinders as rods (N, 3)."""
+def rods_between(starts: Array, ends: Array, radius: float | Array) -> tuple[Array, Array, Array]:
+    """Positions (N, 3), quaternions (N, 4) and scales (N, 3) of unit cylinders as rods (N, 3).
+
+    Args:
+        radius: one, or of each rod (N,).
+    """
     along = ends - starts
     length = np.linalg.norm(along, axis=-1)
     with np.errstate(invalid="ignore"):

@@ -20,8 +20,8 @@ from gough.view.ghosts import draw_modes
 if TYPE_CHECKING:
     import viser
 
-# radii and thicknesses / size of the platform
-JOINT, THICK, THIN, PLATE = 0.017, 0.014, 0.0075, 0.014
+# radius and thickness / size of the platform
+JOINT, PLATE = 0.017, 0.014
 VIEWS = {  # position of the camera, from the middle of the machine, and its upward direction
     "3-D": ((1.05, -1.75, 0.95), (0.0, 0.0, 1.0)),
     "Front": ((0.0, -2.25, 0.0), (0.0, 0.0, 1.0)),
@@ -60,6 +60,7 @@ class Scene:
         self._server, self.platform, self._panel = server, platform, panel
         self.frame = meshes.Frame.of(platform)
         self._hub = platform.moving.mean(axis=0)  # of the plate, in platform coordinates
+        self._thick_radius, self._thin_radius = meshes.leg_radii(platform)
         self._modes: list = []
         with server.atomic():
             self._set_lights()
@@ -96,8 +97,8 @@ class Scene:
             if handle and self.handle is not None:
                 self.handle.position, self.handle.wxyz = place, pose.wxyz
             rods = (
-                (self._thick, parts.thick_start, parts.thick_end, THICK),
-                (self._thin, parts.thin_start, parts.thin_end, THIN),
+                (self._thick, parts.thick_start, parts.thick_end, self._thick_radius),
+                (self._thin, parts.thin_start, parts.thin_end, self._thin_radius),
             )
             for node, start, end, radius in rods:
                 position, wxyz, scale = meshes.rods_between(start, end, radius)
@@ -203,7 +204,7 @@ class Scene:
         if self.platform.rotary is not None:
             axis = np.cross(self.platform.rotary.axis_x, self.platform.rotary.axis_y)
             ends = base - 0.03 * axis, base + 0.03 * axis
-            self._add_rods("/base/motors", *ends, meshes.GREY, 2.2 * THICK)
+            self._add_rods("/base/motors", *ends, meshes.GREY, 2.2 * meshes.THICK)
         places = meshes.label_places(base)
         self._labels = [
             self._server.scene.add_label(
@@ -252,8 +253,8 @@ class Scene:
 
     def _add_legs(self) -> None:
         nowhere = np.zeros((6, 3)), np.tile([0.0, 0.0, 1.0], (6, 1))
-        self._thick = self._add_rods("/legs/thick", *nowhere, meshes.GREY, THICK)
-        self._thin = self._add_rods("/legs/thin", *nowhere, "#C9CED3", THIN)
+        self._thick = self._add_rods("/legs/thick", *nowhere, meshes.GREY, meshes.THICK)
+        self._thin = self._add_rods("/legs/thin", *nowhere, "#C9CED3", meshes.THIN)
         rotary = self.platform.rotary is not None
         self._elbows = (
             self._add_balls("/legs/elbows", nowhere[0], meshes.GREY, JOINT) if rotary else None
