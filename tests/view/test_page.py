@@ -240,7 +240,7 @@ def test_a_file_plays(show: Show, tab: Tab):
     assert float(cell.inner_text()) == pytest.approx(trajectory.legs[30, 0], abs=1e-6)
     tab.click("Play")
     tab.click("Pause")
-    assert 30 <= viewer._row < len(trajectory)
+    assert 30 <= viewer._player.row < len(trajectory)
     tab.number(0).fill(str(trajectory.number[-2]))
     tab.page.get_by_text(trajectory.where(len(trajectory) - 2)).wait_for()
     tab.click("Play")
