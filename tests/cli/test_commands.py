@@ -252,11 +252,11 @@ def test_control_characters_of_files_do_not_reach_the_terminal(gough, tmp_path):
 
 def test_warmup_compiles_everything_and_names_the_folder(gough, monkeypatch):
     """With one job in place of all; the real ones run all compiled functions."""
-    import gough.kernel.jit as jit
-    import gough.kernel.rows  # noqa: F401 - functions that are kept on disk
     from gough import compiling
     from gough.commands import warmup
+    from gough.kernel import jit, rows
 
+    assert rows.settle_rows in jit._kept
     assert {"few rows", "many rows", "tracker", "assembly modes"} <= set(warmup._jobs())
 
     @jit.jit(cache=False)
