@@ -36,18 +36,20 @@ def main(arguments: list[str] | None = None) -> None:
     """
     given = sys.argv[1:] if arguments is None else arguments
     _prepare_streams()
-    notes = logging.StreamHandler()  # what readers of files recognised, on standard error
+    log, notes = logging.getLogger("gough"), logging.StreamHandler()  # what readers recognised
     notes.setFormatter(_Printable())
-    logging.getLogger("gough").addHandler(notes)
+    log.addHandler(notes)
     signals.listen()
-    with compiling.announced(_print_compiling) if sys.stderr.isatty() else nullcontext():
-        code = _run(given)
-    signals.ignore()
     try:
-        sys.stdout.flush()
-    except OSError:  # printed already
-        _drop_output()
-    logging.getLogger("gough").removeHandler(notes)
+        with compiling.announced(_print_compiling) if sys.stderr.isatty() else nullcontext():
+            code = _run(given)
+        signals.ignore()
+        try:
+            sys.stdout.flush()
+        except OSError:  # printed already
+            _drop_output()
+    finally:  # a mistake in the options ends here too
+        log.removeHandler(notes)
     sys.exit(code)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import subprocess
 import sys
@@ -135,6 +136,14 @@ def test_help_loads_no_heavy_library(arguments):
         [sys.executable, "-c", program], check=False, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_no_command_leaves_its_handler_of_notes(gough):
+    log = logging.getLogger("gough")
+    before = list(log.handlers)
+    assert gough("solve", "--no-such-option").code == 2
+    assert gough("platforms").code == 0
+    assert log.handlers == before
 
 
 def test_version(gough):
