@@ -32,6 +32,7 @@ from gough.kernel.threads import cores
 from gough.view.viewer import Viewer
 
 MACHINES = ("reference", "reachy_mini", "rubin_camera")
+CELL = Path(__file__).parents[1] / "examples" / "cell.toml"  # joint cones, thick legs, and frames
 WINDOWS = ((640, 480), (1360, 900))
 SECONDS = 5.0
 RATE = 120  # slider positions sent in a second
@@ -69,9 +70,9 @@ def main() -> None:
     print(f"{cores()} cores, load before the start {load:.1f}, viser {viser.__version__}\n")
     print("| machine | slider positions/s sent | pictures/s that arrive |")
     print("|---|---|---|")
-    for name in MACHINES:
-        sent, came = over_the_wire(name)
-        print(f"| {name} | {sent:.0f} | {came:.0f} |", flush=True)
+    for name, frame in [*((name, None) for name in MACHINES), (str(CELL), "tool in work")]:
+        sent, came = over_the_wire(name, frame)
+        print(f"| {Path(name).stem} | {sent:.0f} | {came:.0f} |", flush=True)
     found = chromium.find()
     if found is None:
         sys.exit(chromium.MISSING)
@@ -81,10 +82,10 @@ def main() -> None:
     print(f"\nload at the end {os.getloadavg()[0]:.1f}")
 
 
-def over_the_wire(name: str) -> tuple[float, float]:
+def over_the_wire(name: str, frame: str | None) -> tuple[float, float]:
     """Positions of a leg slider sent, and positions of the plate received, a second."""
     machine = gough.Platform.load(name)
-    with closing(Viewer(machine, port=0)) as viewer:
+    with closing(Viewer(machine, port=0, frame=frame)) as viewer:
         viewer._connected.set()
         while not viewer._ready:
             time.sleep(0.05)

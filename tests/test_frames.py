@@ -190,12 +190,12 @@ def test_forces_and_twists_of_a_frame_have_the_same_power(seed: int) -> None:
     rates = gough.leg_rates(platform, pose, twist, frame)
     forces = gough.leg_forces(platform, pose, load, frame)
     power = np.abs(forces) @ np.abs(rates)
-    np.testing.assert_allclose(forces @ rates, load @ twist, rtol=1e-9, atol=1e-12 * power)
+    assert abs(forces @ rates - load @ twist) <= 1e-9 * power
     units = np.repeat([1.0, platform.size], 3)
     back = gough.wrench(platform, pose, forces, frame) / units
     np.testing.assert_allclose(back, load / units, rtol=1e-7, atol=1e-9)
-    again = gough.twist(platform, pose, rates, frame) * units[::-1]
-    np.testing.assert_allclose(again, twist * units[::-1], rtol=1e-7, atol=1e-9 * platform.size)
+    again = gough.twist(platform, pose, rates, frame) / units[::-1]
+    np.testing.assert_allclose(again, twist / units[::-1], rtol=1e-7, atol=1e-9)
 
 
 @support.at_most(20)

@@ -1,5 +1,8 @@
 """Poses as makers write them: against what their manuals publish, and against SciPy and MuJoCo."""
 
+# MuJoCo has no types
+# pyright: reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -103,6 +103,6 @@ def _speed(platform: Platform, pose: Pose, frame: str | None) -> Array:
 def _error(platform: Platform, pose: Pose, frame: str | None) -> Array:
     """Standard deviation in the worst direction, of readings with standard deviation 1."""
     covariance = pose_covariance(platform, pose, 1.0, frame)[..., :3, :3]
-    known = np.isfinite(covariance).all(axis=(-2, -1))
+    known = np.all(np.isfinite(covariance), axis=(-2, -1))
     safe = np.where(known[..., None, None], covariance, 0.0)
     return np.where(known, np.sqrt(np.linalg.eigvalsh(safe)[..., -1]), np.nan)
