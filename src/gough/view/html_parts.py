@@ -104,11 +104,12 @@ def numbers_table(model: Model) -> str:
         heads = with_unit(names[i], units[0][i]), with_unit(POSE_NAMES[i], units[1][i])
         cells = (heads[0], values[2 * i], heads[1], values[2 * i + 1])
         rows += "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
+    whose = f"pose of {model.frame}" if model.frame else ""
     return (
         "<style>[data-gough=numbers]{font-variant-numeric:tabular-nums;border-spacing:0;"
-        "width:100%}[data-gough=numbers] td{padding:0;white-space:nowrap}"
+        "width:100%}[data-gough=numbers] td{padding:0 0.4em 0 0;white-space:nowrap}"
         "[data-gough=numbers] td:nth-child(even){text-align:right;padding-right:0.9em}</style>"
-        f"<div style='margin:0.3em 0.95em;font-size:0.85em'>"
+        f"<div style='margin:0.3em 0.95em;font-size:0.85em'>{escape(whose)}"
         f"<table data-gough='numbers'>{rows}</table></div>"
     )
 
