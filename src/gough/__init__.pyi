@@ -39,6 +39,7 @@ from .modes.result import AssemblyModes as AssemblyModes
 from .platform import Platform as Platform
 from .pose import Pose as Pose
 from .rotary import RotaryArms as RotaryArms
+from .screws import Screws as Screws
 from .seeds.base import PoseSeed as PoseSeed
 from .seeds.base import Seed as Seed
 from .seeds.network import NetworkSeed as NetworkSeed

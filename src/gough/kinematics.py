@@ -19,6 +19,7 @@ from gough import struts
 from gough.checks import Array, as_batch
 from gough.errors import GoughError
 from gough.platform import Platform
+from gough.platform_checks import refuse_screws
 from gough.pose import Pose, as_pose
 from gough.tables import Table, as_readings
 
@@ -61,8 +62,19 @@ def leg_lengths(platform: Platform, pose: Pose | Table, frame: str | None = None
         (6,)
     """
     with np.errstate(over="ignore", invalid="ignore"):  # poses out of reach, and far beyond it
-        vectors = strut_vectors(platform, platform_pose(platform, as_pose(pose), frame))
-        return struts.readings(vectors, platform.true_at_zero, platform.gain, platform.rotary)
+        own = platform_pose(platform, as_pose(pose), frame)
+        vectors, zero, gain = strut_vectors(platform, own), platform.true_at_zero, platform.gain
+        turned = screw_lengths(platform, own)
+        return struts.readings(vectors, zero, gain, platform.rotary, turned)
+
+
+def screw_lengths(platform: Platform, pose: Pose) -> Array | float:
+    """What screws that turn with their legs add to the lengths, (..., 6) [platform unit].
+
+    0.0 for a platform without such screws; see `gough.struts.screw_turns`.
+    """
+    vectors, side = strut_vectors(platform, pose), platform.screw_side
+    return struts.screw_lengths(platform.screw, side, vectors, pose.rotation)
 
 
 def platform_pose(platform: Platform, pose: Pose, frame: str | None) -> Pose:
@@ -80,9 +92,13 @@ def equivalent_struts(platform: Platform, legs: ArrayLike | Table) -> tuple[Arra
     Args:
         legs: readings (..., 6).
 
+    Raises:
+        PlatformError: the screws of the legs turn with them, so that readings alone give no length.
+
     Returns:
         Base joints (..., 6, 3) and strut lengths (..., 6) [platform unit].
     """
+    refuse_screws(platform)
     zero, gain = platform.true_at_zero, platform.gain
     return struts.equivalent(platform.base, zero, gain, platform.rotary, as_readings(legs))
 
@@ -116,6 +132,7 @@ def jacobian(platform: Platform, pose: Pose, frame: str | None = None) -> Array:
         strut_vectors(platform, own), platform.gain, platform.rotary
     )
     levers = _levers(platform, own)
+    turn = np.eye(3)
     if frame is not None:
         view = platform.frame(frame)
         turn = view.before.rotation  # of all vectors to coordinates of the frame at rest
@@ -123,7 +140,14 @@ def jacobian(platform: Platform, pose: Pose, frame: str | None = None) -> Array:
         rods = rods @ turn.T
     rows = np.concatenate([rods, np.cross(levers, rods)], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return rows / rates[..., None]
+        rows /= rates[..., None]
+    screw = platform.screw
+    if screw is not None:
+        axes = screw.moving_axis @ np.swapaxes(own.rotation, -1, -2) @ turn.T
+        base_axes, side = screw.base_axis @ turn.T, platform.screw_side
+        turns = struts.screw_turn_rates(rods, levers, base_axes, axes, side)
+        rows += (screw.lead / (2 * np.pi * platform.gain))[:, None] * turns
+    return rows
 
 
 def singularity_distance(platform: Platform, pose: Pose) -> Array:

@@ -16,7 +16,7 @@ from gough import struts
 from gough.checks import Array
 from gough.errors import PlatformError
 from gough.machine_limits import MachineLimits, Payload
-from gough.platform_checks import COINCIDENT
+from gough.platform_checks import COINCIDENT, refuse_screws
 from gough.pose import Pose
 
 if TYPE_CHECKING:
@@ -113,6 +113,7 @@ def payload_forces(platform: Platform, pose: Pose, payload: Payload | None = Non
         raise PlatformError(
             "limits.payload: the platform states none; pass payload=gough.Payload(mass, centre)"
         )
+    refuse_screws(platform)
     vectors = _strut_vectors(platform, pose)
     rods, rates = struts.rods_and_rates(vectors, np.ones(6), platform.rotary)
     arms = struts.levers(platform.moving, platform.pivot_point, pose.rotation)

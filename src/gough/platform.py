@@ -21,6 +21,7 @@ from gough.machine_limits import MachineLimits
 from gough.platform_checks import LegKind
 from gough.pose import Pose
 from gough.rotary import RotaryArms
+from gough.screws import Screws
 from gough.text import page, vector
 from gough.workspace import Workspace
 
@@ -49,6 +50,7 @@ class Platform:
         pivot: (3,) point of the platform, in its own coordinates, that poses rotate about.
         workspace: the poses the machine is meant for.
         rotary: the motor arms, for rotary legs only.
+        screw: the screws of legs that turn with their joints, which changes their readings.
         frames: named frames, such as a tool on the platform and a work piece beside the base.
         limits: what joints, legs and motors allow; see `gough.limits`.
 
@@ -75,6 +77,7 @@ class Platform:
     pivot: Array | None
     workspace: Workspace | None
     rotary: RotaryArms | None
+    screw: Screws | None
     offset: Array
     gain: Array
     frames: Frames | None
@@ -93,13 +96,14 @@ class Platform:
         pivot: ArrayLike | None = None,
         workspace: Workspace | None = None,
         rotary: RotaryArms | None = None,
+        screw: Screws | None = None,
         offset: ArrayLike = 0.0,
         gain: ArrayLike = 1.0,
         frames: Frames | None = None,
         limits: MachineLimits | None = None,
     ) -> None:
         platform_checks.check_text(unit=unit, name=name)
-        platform_checks.check_parts(legs, workspace, rotary, frames, limits)
+        platform_checks.check_parts(legs, workspace, rotary, screw, frames, limits)
         fields = {
             "base": platform_checks.joints("base", base),
             "moving": platform_checks.joints("moving", moving),
@@ -110,6 +114,7 @@ class Platform:
             "pivot": None if pivot is None else platform_field("pivot", pivot, (3,)),
             "workspace": workspace,
             "rotary": rotary,
+            "screw": screw,
             "offset": one_or_six("offset", offset),
             "gain": platform_checks.nonzero("gain", one_or_six("gain", gain)),
             "frames": frames,
@@ -176,13 +181,22 @@ class Platform:
         """Strut length [platform unit] or motor angle [rad] of a leg that reads 0, (6,)."""
         if self.legs != "length_change":
             return self.offset
-        return frozen(self.home_lengths + self.offset)
+        return frozen(self.home_lengths + self._turned_at_home() + self.offset)
 
     @cached_property
     def home_legs(self) -> Array:
         """Readings at home (6,); zeros for length changes without offset."""
         zero, gain = self.true_at_zero, self.gain
-        return frozen(struts.readings(self._home_struts(), zero, gain, self.rotary))
+        turned = self._turned_at_home()
+        return frozen(struts.readings(self._home_struts(), zero, gain, self.rotary, turned))
+
+    @cached_property
+    def screw_side(self) -> Array:
+        """Signs (6,) by which the turns of the legs' screws at home are within 90 deg."""
+        if self.screw is None:
+            return frozen(np.ones(6))
+        axes = self.screw.moving_axis @ self.home.rotation.T
+        return frozen(struts.screw_sides(self._home_struts(), self.screw.base_axis, axes))
 
     @cached_property
     def size(self) -> float:
@@ -209,7 +223,7 @@ class Platform:
             if np.any(getattr(self, key) != usual):
                 out[key] = getattr(self, key).tolist()
         out["home"] = _pose_dict(self.home)
-        for key in ("workspace", "rotary"):
+        for key in ("workspace", "rotary", "screw"):
             part = getattr(self, key)
             if part is not None:
                 out[key] = {k: _plain(k, v) for k, v in vars(part).items()}
@@ -308,6 +322,11 @@ class Platform:
     def _home_struts(self) -> Array:
         return self._moving_at_home() - self.base
 
+    def _turned_at_home(self) -> Array | float:
+        """Lengths (6,) that the screws add at home."""
+        rotation = self.home.rotation
+        return struts.screw_lengths(self.screw, self.screw_side, self._home_struts(), rotation)
+
     # ---- identity ---------------------------------------------------------------------
 
     def __eq__(self, other: object) -> bool:
@@ -357,8 +376,8 @@ def _pose_dict(pose: Pose) -> dict[str, list]:
 
 
 def _plain(key: str, value: Array) -> list | float:
-    """An array as lists; lengths that six arms share as one number."""
-    if key in ("arm_length", "rod_length") and np.all(value == value[0]):
+    """An array as lists; a length that six legs share as one number."""
+    if key in ("arm_length", "rod_length", "lead") and np.all(value == value[0]):
         return float(value[0])
     return value.tolist()
 

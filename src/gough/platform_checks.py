@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,11 @@ from gough.errors import CONTROL, PlatformError
 from gough.frames import Frames
 from gough.machine_limits import MachineLimits
 from gough.rotary import RotaryArms
+from gough.screws import Screws
 from gough.workspace import Workspace
+
+if TYPE_CHECKING:
+    from gough.platform import Platform
 
 LegKind = Literal["telescopic", "length_change", "rotary"]
 COINCIDENT = 1e-9  # joints closer than this share of the platform's size are one point
@@ -30,20 +34,32 @@ def check_text(**fields: object) -> None:
 
 
 def check_parts(
-    legs: str, workspace: object, rotary: object, frames: object, limits: object
+    legs: str, workspace: object, rotary: object, screw: object, frames: object, limits: object
 ) -> None:
     """Raise unless the kind of leg is known and the parts are what it needs."""
     if legs not in get_args(LegKind):
         kinds = ", ".join(get_args(LegKind))
         raise PlatformError(f"legs: expected one of {kinds}; found {legs!r}")
     parts = (("rotary", RotaryArms, rotary), ("workspace", Workspace, workspace))
-    parts = (*parts, ("frames", Frames, frames), ("limits", MachineLimits, limits))
+    parts = (*parts, ("screw", Screws, screw), ("frames", Frames, frames))
+    parts = (*parts, ("limits", MachineLimits, limits))
     for name, kind, part in parts:
         if part is not None and not isinstance(part, kind):
             raise PlatformError(f"{name}: expected a {kind.__name__}, found {part!r}")
     if (legs == "rotary") != (rotary is not None):
         need = "needs" if legs == "rotary" else "must not have"
         raise PlatformError(f"rotary: a platform with {legs} legs {need} this table")
+    if rotary is not None and screw is not None:
+        raise PlatformError("screw: a platform with rotary legs must not have this table")
+
+
+def refuse_screws(platform: Platform) -> None:
+    """Raise PlatformError if the screws of a platform's legs turn with them."""
+    if platform.screw is not None:
+        raise PlatformError(
+            "screw: only readings, Solver, solve, Tracker, jacobian and what follows from it know "
+            "legs whose screws turn with them; leave the table [screw] out to neglect the turning"
+        )
 
 
 def nonzero(name: str, value: Array) -> Array:

@@ -20,6 +20,7 @@ from gough.machine_limits import KEYS, MachineLimits, known_keys
 from gough.platform import Platform
 from gough.pose import Pose
 from gough.rotary import RotaryArms
+from gough.screws import Screws
 from gough.whole_file import write_whole
 from gough.workspace import Workspace
 
@@ -27,12 +28,13 @@ log = logging.getLogger("gough")
 REQUIRED = ("base", "moving", "home")
 PLAIN = ("name", "unit", "legs", "stroke", "pivot", "offset", "gain")
 ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180}
-OPTIONAL = (*PLAIN, "angle_unit", "workspace", "rotary", "frames", "limits", "readings")
+OPTIONAL = (*PLAIN, "angle_unit", "workspace", "rotary", "screw", "frames", "limits", "readings")
 POSE = ("position", "wxyz", "euler_deg", "order")
 TABLES = {
     "home": POSE,
     "workspace": ("translation", "rotation_deg"),
     "rotary": ("arm_length", "rod_length", "axis_x", "axis_y", "branch"),
+    "screw": ("lead", "base_axis", "moving_axis"),
     "limits": KEYS,
 }
 
@@ -148,6 +150,7 @@ def from_dict(facts: dict) -> Platform:
         _pose("home", facts["home"]),
         workspace=_table(Workspace, "workspace", facts),
         rotary=_table(RotaryArms, "rotary", facts),
+        screw=_table(Screws, "screw", facts),
         frames=_frames(facts["frames"]) if "frames" in facts else None,
         limits=MachineLimits(**facts["limits"]) if "limits" in facts else None,
         **options,

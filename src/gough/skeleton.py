@@ -64,7 +64,9 @@ def skeleton(platform: Platform, pose: Pose, readings: Array | None = None) -> S
         raise GoughError("pose: holds NaN, because no pose was found: nothing to draw")
     if readings is None:
         readings = leg_lengths(platform, pose)
-    tips, _ = equivalent_struts(platform, readings)
+    tips = platform.base
+    if platform.rotary is not None:
+        tips, _ = equivalent_struts(platform, readings)
     return Skeleton(
         platform.base, tips, joint_positions(platform, pose), readings,
         stroke_share(platform, readings), outside_stroke(platform, readings),

@@ -40,6 +40,9 @@ def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
     if arms is not None:
         lengths = factor * arms.arm_length, factor * arms.rod_length
         arms = replace(arms, arm_length=lengths[0], rod_length=lengths[1])
+    screw = platform.screw
+    if screw is not None:
+        screw = replace(screw, lead=factor * screw.lead)
     along = 1.0 if arms is not None else factor  # of readings
     return replace(
         platform,
@@ -52,6 +55,7 @@ def scaled(platform: Platform, factor: float, unit: str = "") -> Platform:
         offset=along * platform.offset,
         workspace=None if box is None else replace(box, translation=factor * box.translation),
         rotary=arms,
+        screw=screw,
         frames=platform.frames and platform.frames.scaled(factor),
         limits=platform.limits and platform.limits.scaled(factor, rotary=arms is not None),
     )

@@ -20,6 +20,7 @@ from gough import struts
 from gough.checks import Array, as_batch
 from gough.kinematics import jacobian, platform_pose, singularity_distance, strut_vectors
 from gough.platform import Platform
+from gough.platform_checks import refuse_screws
 from gough.pose import Pose
 
 ROUNDING = 1e-15  # distance to a singularity that rounding alone leaves at one
@@ -106,6 +107,7 @@ def leg_accelerations(
         >>> gough.leg_accelerations(platform, platform.home, still, upward).round(3)
         array([9.153, 9.153, 9.153, 9.153, 9.153, 9.153])
     """
+    refuse_screws(platform)
     motion = as_batch("twist", twist, (6,))[..., None, :]
     change = as_batch("acceleration", acceleration, (6,))[..., None, :]
     own = platform_pose(platform, pose, frame)

@@ -9,16 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gough import limit_rules
 from gough.checks import Array, as_number, as_whole
 from gough.errors import GoughError
 from gough.fk.rows import Rows
+from gough.fk.screws import readings_without_turning, without_turning
 from gough.fk.solution import Solution
 from gough.kernel.constants import SINGULAR, kernel_constants, to_internal
 from gough.kernel.layout import COMPONENTS, OPEN, WIDTH
 from gough.kernel.rows import STEPS, settle_rows, solve_rows
 from gough.kernel.threads import in_parts
-from gough.kinematics import home_sign
+from gough.kinematics import home_sign, leg_lengths, screw_lengths
 from gough.platform import Platform, as_platform
+from gough.platform_checks import refuse_screws
 from gough.pose import Pose
 from gough.seeds.base import PoseSeed, Seed, Start, find_seed, further_starts, starting_poses
 from gough.status import USABLE, Status
@@ -172,7 +175,10 @@ class Solver:
         if self.frame is not None:
             view = self.platform.frame(self.frame)
             seed = view.platform_pose(seed) if isinstance(seed, Pose) else seed
-        given["seed"] = find_seed(self.platform, seed, guess_only=not self.max_iterations)
+        machine = self.platform
+        if machine.screw is not None:
+            machine = without_turning(machine)
+        given["seed"] = find_seed(machine, seed, guess_only=not self.max_iterations)
 
     def __call__(
         self,
@@ -212,6 +218,12 @@ class Solver:
         """
         readings = as_readings(legs)
         flat = readings.reshape(-1, 6)
+        if self.platform.screw is not None:
+            if certify or ambiguous or limits:
+                refuse_screws(self.platform)
+            rows, batch = self._solve_turning(flat), readings.shape[:-1]
+            found = rows.solution(self.platform, batch, None, leg_noise, table_info(legs))
+            return found if self.frame is None else found.in_frame(self.platform, self.frame)
         if not (flat.flags.c_contiguous and flat.flags.writeable):
             flat = flat.copy()  # compiled code is made for such arrays alone
         rows = Rows.empty(len(flat))
@@ -240,6 +252,10 @@ class Solver:
         The first call compiles what its rows need, and the first row that Newton's method does
         not settle the rest; a program that cannot wait for it then calls this before.
         """
+        if self.platform.screw is not None:
+            machine = without_turning(self.platform)
+            replace(self, platform=machine, frame=None).compile(count)
+            return
         legs = np.tile(self.platform.home_legs, (min(count, FEW + 1), 1))
         solver = replace(self, seed="home")
         solver(legs, certify=certify, limits=limits)
@@ -248,6 +264,27 @@ class Solver:
         if len(legs) > FEW and self._has_no_box:
             rows.status[:] = OPEN
             solver._accept_reached(legs[:1], rows)
+
+    def _solve_turning(self, legs: Array) -> Rows:
+        """Solve readings (N, 6) of legs whose screws turn with them."""
+        platform = self.platform
+        solver = replace(self, platform=without_turning(platform), frame=None)
+        count = (len(legs), 1)
+        home = Pose(np.tile(platform.home.position, count), np.tile(platform.home.wxyz, count))
+        first = solver(legs - screw_lengths(platform, home) / platform.gain)
+        found = solver(readings_without_turning(platform, legs, first.pose))
+        rows = Rows.empty(len(legs))
+        rows.iterations[:] = first.iterations
+        rows.put(np.arange(len(legs)), found)
+        with np.errstate(invalid="ignore"):
+            errors = platform.gain * (leg_lengths(platform, found.pose) - legs)
+        rows.residual[:] = np.max(np.abs(errors), axis=-1, initial=0.0)
+        missed = found.usable & ~(rows.residual <= self.tolerance * platform.size)
+        rows.status[missed] = Status.NOT_CONVERGED
+        beyond = np.isin(rows.status, (Status.CONVERGED, Status.OUTSIDE_WORKSPACE))
+        beyond &= ~limit_rules.in_stroke(platform, legs)
+        rows.status[beyond] = Status.OUTSIDE_STROKE
+        return rows
 
     @property
     def _is_unsure(self) -> bool:

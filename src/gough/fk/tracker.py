@@ -12,6 +12,7 @@ from gough import quaternion, velocities
 from gough.checks import Array, as_number, as_whole
 from gough.errors import GoughError
 from gough.fk.rows import Rows
+from gough.fk.screws import readings_without_turning, without_turning
 from gough.fk.solution import Solution
 from gough.fk.solve import Solver
 from gough.kernel import layout
@@ -28,6 +29,7 @@ from gough.kernel.cycle import (
     cycle,
 )
 from gough.kinematics import assembly_sign, pose_covariance
+from gough.limit_rules import in_stroke
 from gough.platform import Platform, as_platform
 from gough.pose import Pose, pose_cells
 from gough.status import Event, Status
@@ -108,9 +110,12 @@ class Tracker:
         if start is not None:
             _check_start(start)
             start = start if self._view is None else self._view.platform_pose(start)
-        self._constants = kernel_constants(platform, self._solver.singular)
+        # legs whose screws turn with them are followed as legs that do not turn
+        machine = platform if platform.screw is None else without_turning(platform)
+        self._constants = kernel_constants(machine, self._solver.singular)
         self._limits = np.array([self._solver.tolerance, self._solver.singular, 0.0, 0.0])
-        self._legs = platform.home_legs[None].copy()
+        self._legs = machine.home_legs[None].copy()
+        self._reading = self._legs[0]
         self._state = np.zeros((1, STATE))
         self._buffer, self._work = np.zeros(layout.COMPONENTS), np.zeros((4, 6, 6))
         self._position, self._wxyz = np.zeros((1, 3)), np.zeros((1, 4))
@@ -178,7 +183,14 @@ class Tracker:
         except (TypeError, ValueError) as error:
             raise GoughError(f"legs: expected six numbers, found {reprlib.repr(legs)}") from error
         self._rates, self._elapsed = leg_rates, self._missed + 1
+        turning = self.platform.screw is not None
+        if turning:
+            self._reading = self._legs[0].copy()
+            present = Pose.trusted(self._position, self._wxyz)
+            self._legs = readings_without_turning(self.platform, self._legs, present)
         code = FAILED if self._lost else self._run_cycle()
+        if turning and code in (Status.CONVERGED, Status.OUTSIDE_WORKSPACE):
+            code = code if in_stroke(self.platform, self._reading) else int(Status.OUTSIDE_STROKE)
         if code >= layout.OPEN:
             self._recover(code)
         else:
@@ -219,7 +231,7 @@ class Tracker:
         events = np.full(len(flat), Event.FOLLOWED, np.uint8)
         row = 0
         while row < len(flat):
-            if not self._lost and not self._missed:
+            if not self._lost and not self._missed and self.platform.screw is None:
                 row = follow(
                     self._constants, flat, row, self._legs, self._state, self._limits, self._buffer,
                     self._work, self._position, self._wxyz, rows.arrays(),
@@ -312,7 +324,7 @@ class Tracker:
         if code == BAD_READING:
             self._code, self.event = int(Status.INVALID_INPUT), Event.HELD
             return
-        found = self._solver(self._legs[0])
+        found = self._solver(self._reading)
         self._code, usable = int(found.status), bool(found.usable)
         self._miss = float(found.residual), int(found.iterations)
         if not usable and self._code not in (Status.OTHER_MODE, Status.AMBIGUOUS):

@@ -19,6 +19,7 @@ from gough.kinematics import (
     normalised_jacobian,
 )
 from gough.platform import Platform
+from gough.platform_checks import refuse_screws
 from gough.pose import Pose
 
 
@@ -29,6 +30,7 @@ def kernel_constants(platform: Platform, singular: float = SINGULAR) -> Array:
     Args:
         singular: distance to singularity below which poses are to be looked at closely.
     """
+    refuse_screws(platform)
     size = platform.size
     c = np.zeros(layout.CONSTANTS)
     order = solving_order(platform)

@@ -13,6 +13,7 @@ from gough.limit_geometry import PAIRS, joint_axes, least_gaps, leg_gaps, shared
 from gough.limit_rules import SLACK
 from gough.machine_limits import MachineLimits
 from gough.platform import Platform
+from gough.platform_checks import refuse_screws
 
 # Kinds of limits: columns of margins and shares.
 NAMES = (
@@ -61,6 +62,7 @@ CONSTANTS = 292
 @lru_cache(maxsize=256)
 def limit_constants(platform: Platform) -> Array:
     """Return the constants (CONSTANTS,) of a platform, which may state any of the limits."""
+    refuse_screws(platform)
     limits = platform.limits or MachineLimits()
     size, order = platform.size, solving_order(platform)
     determinant = np.linalg.det(normalised_jacobian(platform, platform.home)[order])

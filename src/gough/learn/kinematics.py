@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from gough.platform import Platform
+from gough.platform_checks import refuse_screws
 
 
 class TorchPlatform(nn.Module):
@@ -37,6 +38,7 @@ class TorchPlatform(nn.Module):
 
     def __init__(self, platform: Platform, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
+        refuse_screws(platform)
         self.platform = platform
         rotary = platform.rotary
         values = {
