@@ -228,6 +228,7 @@ def test_motors_have_no_screws() -> None:
         lambda p: gough.reach(p, p.home),
         lambda p: gough.payload_forces(p, p.home, gough.Payload(1.0)),
         lambda p: gough.leg_accelerations(p, p.home, np.zeros(6), np.zeros(6)),
+        lambda p: gough.plan_poses(p, 12),
         c_files,
         to_mjcf,
     ],

@@ -25,6 +25,7 @@ from gough import quaternion
 from gough.calibration.arrays import Array
 from gough.errors import PlatformError
 from gough.platform import Platform
+from gough.platform_checks import refuse_screws
 from gough.pose import Pose
 
 JOINTS = ("base x", "base y", "base z", "platform x", "platform y", "platform z")
@@ -57,6 +58,7 @@ class Parameters:
         self.rotary = drawing.rotary is not None
         self.names = (*JOINTS, "offset", *ROTARY * self.rotary, *("gain",) * gains)
         self.rest = drawing.home_legs
+        refuse_screws(drawing)
         self.drawn = self.values(drawing)
         self.tolerance = np.full(self.drawn.shape, float(tolerance))
         if drawing.rotary is not None:
