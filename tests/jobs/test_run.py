@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 import multiprocessing
@@ -23,8 +24,10 @@ from hypothesis import strategies as st
 import gough
 from gough.errors import GoughError
 from gough.files import Reading, solve_file
+from gough.files.stores import Place
 from gough.jobs import Job, Made, Summary, Unit, finished, make, plan, run_job
 from gough.jobs.cut import line_ends
+from gough.jobs.outputs import output_place
 
 from .conftest import ROWS, write
 
@@ -212,6 +215,10 @@ def test_names_cannot_leave_the_folder(tmp_path, platform, logs):
         assert made.error, name
         with pytest.raises(GoughError):
             finished(job, Unit(unit.source, name, 1, 1, name))
+        if "link" not in name and name != "file.parquet":
+            stored = dataclasses.replace(job, out=Place("bucket/poses", "s3://bucket/"))
+            with pytest.raises(GoughError, match="leads out of"):
+                output_place(stored, Unit(unit.source, name, 1, 1, name))
     assert not [*(tmp_path / "elsewhere").iterdir()]
     assert {p.name for p in tmp_path.iterdir()} == {"elsewhere", "logs", "poses"}
 
@@ -298,6 +305,9 @@ def test_a_job_can_be_sent_and_its_platform_is_the_same(platform):
     sent = pickle.loads(pickle.dumps(job))
     assert (sent, sent.facts, sent.machine) == (job, job.facts, platform)
     assert job.machine.digest == platform.digest
+    for name in ("max_iterations", "restarts"):
+        assert Job.of("solve", platform, "poses", **{name: 0}).facts[name] == 0
+    assert "limits" not in Job.of("solve", platform, "poses", limits=None).facts
 
 
 def test_a_network_that_changed_is_another_job(tmp_path, platform, monkeypatch):

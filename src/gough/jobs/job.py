@@ -109,7 +109,8 @@ class Job:
             **asdict(self.reading),
         }
         found |= found.pop("log")
-        found = {name: value for name, value in found.items() if value not in (None, False, "", ())}
+        # 0 is a value, though it equals False
+        found = {n: v for n, v in found.items() if v not in (None, "", ()) and v is not False}
         return json.loads(json.dumps(found, sort_keys=True))
 
     @cached_property
