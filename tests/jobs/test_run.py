@@ -258,11 +258,8 @@ def test_outputs_below_the_inputs_are_not_inputs(tmp_path, platform, logs):
 
 
 @pytest.mark.process
-def test_processes_write_the_same_bytes_and_one_that_dies_loses_nothing(
-    tmp_path, platform, logs, monkeypatch
-):
+def test_processes_write_the_same_bytes_and_one_that_dies_loses_nothing(tmp_path, platform, logs):
     solved(platform, tmp_path / "one", logs)
-    monkeypatch.setattr("gough.jobs.local.FEW_BYTES", 0)
     job = Job.of("solve", platform, tmp_path / "two", reading=KEEP, seed="home")
     names = []
 

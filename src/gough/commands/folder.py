@@ -102,10 +102,11 @@ def run_folder(
     """Run a job, print its summary and return the exit code."""
     from gough.commands import as_json, signals
     from gough.errors import InputError
+    from gough.files.stores import without_credentials
     from gough.jobs import Job, run_job
     from gough.jobs.job import SHARD_ROWS
 
-    if out is None or out == "-" or out.lower().endswith(ENDINGS):
+    if out is None or out == "-" or without_credentials(out).lower().endswith(ENDINGS):
         found = "pass one" if out is None else f"{out} is one file"
         raise InputError(
             f"{words[0]}: many files are written to a folder, such as -o poses/; {found}"
@@ -126,12 +127,12 @@ def run_folder(
                 progress=lambda source, report: signals.check(), **settings,
             )  # fmt: skip
     except signals.Stopped as stop:
-        stop.left = f"files finished are in {out}; the same command goes on"
+        stop.left = f"files finished are in {without_credentials(out)}; the same command goes on"
         raise
     if json:
         as_json.print_json(summary.facts())
     else:
-        _print(summary, out)
+        _print(summary, without_credentials(out))
     if summary.failed:
         return 2
     return 1 if summary.unusable and not allow_failures else 0

@@ -24,7 +24,7 @@ from gough.files.log_format import LogFormat, split_unit
 from gough.files.metadata import check_same, describe, pose_frame
 from gough.files.plausible import check_plausible
 from gough.files.rows import Reading, Sink, Source
-from gough.files.stores import Place, written
+from gough.files.stores import Place, without_credentials, written
 from gough.frames import FramePose
 from gough.platform import Platform
 from gough.whole_file import explain
@@ -109,13 +109,14 @@ def file_format(path: Given | Out, *, read: bool = False) -> str:
     Raises:
         GoughError: another ending.
     """
-    ending = Path(str(path)).suffix.lower()
+    name = without_credentials(str(path))  # nor options of a store
+    ending = Path(name).suffix.lower()
     if isinstance(path, GivenRow) or str(path) == STANDARD or (read and ending in TEXT):
         return ".csv"
     if ending not in FORMATS:
         text = f" (or {', '.join(TEXT)} for text and sheets)" if read else ""
         raise GoughError(
-            f"{path}: the name must end in .csv or .parquet{text}, or be - for CSV on standard "
+            f"{name}: the name must end in .csv or .parquet{text}, or be - for CSV on standard "
             f"{'input' if read else 'output'}"
         )
     return ending

@@ -19,7 +19,10 @@ from gough.jobs.job import Job, Made, Unit
 from gough.jobs.work import make
 from gough.kernel.threads import cores
 
-FEW_BYTES = 1 << 25  # of inputs that one process converts before another has started
+# A worker takes one to two seconds of a core to start; less work than this is done in this process.
+WORTHWHILE = 5.0  # [s]
+PER_UNIT = 0.01  # [s] to open, to bring to the disk, and to rename
+BYTES = {"solve": 5e7, "inverse": 5e7, "modes": 2.5e5}  # of input a second and core, about
 TRIES = 2  # of a unit whose worker died
 PATIENCE = 5.0  # [s] for a worker to remove its unfinished file
 
@@ -39,12 +42,13 @@ def run_local(
     Args:
         job: what to do.
         units: what to make.
-        workers: number of processes; all cores unless given. One, one unit, or little to read is
-            done in this process, with the solver's threads.
+        workers: number of processes; all cores unless given. Unless given, what takes a few
+            seconds is done in this process with the solver's threads, as one unit always is.
         progress: called after every block of rows that this process solves.
     """
     count = min(workers or cores(), len(units))
-    if count <= 1 or sum(unit.size for unit in units) < FEW_BYTES:
+    work = PER_UNIT * len(units) + sum(unit.size for unit in units) / BYTES[job.command]
+    if count <= 1 or (workers is None and work < WORTHWHILE):
         for unit in units:
             yield make(job, unit, progress, threads=workers or cores())
         return
