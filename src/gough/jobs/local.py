@@ -16,7 +16,7 @@ from typing import Any
 
 from gough.files.convert import Progress
 from gough.jobs.job import Job, Made, Unit
-from gough.jobs.work import make
+from gough.jobs.work import compile_for, make
 from gough.kernel.threads import cores
 
 # A worker takes one to two seconds of a core to start; less work than this is done in this process.
@@ -52,6 +52,7 @@ def run_local(
         for unit in units:
             yield make(job, unit, progress, threads=workers or cores())
         return
+    compile_for(job)  # once; and workers that compile at the same time could differ in last digits
     context = multiprocessing.get_context("spawn")
     waiting = [_Try(unit) for unit in reversed(units)]
     busy: list[_Worker] = []

@@ -19,6 +19,7 @@ from gough.files.rows import Source
 from gough.files.stores import without_credentials
 from gough.jobs.job import Job, Made, Unit
 from gough.jobs.outputs import JOB, ROWS, UNIT, output_place, write_record
+from gough.modes.assembly import assembly_modes
 from gough.status import ModesStatus
 
 MOST_NOTES = 6
@@ -69,6 +70,18 @@ def make(job: Job, unit: Unit, progress: Progress | None = None, threads: int = 
     notes = [printable(without_credentials(text)) for text in notes[:MOST_NOTES]]
     seconds = time.perf_counter() - began
     return Made(unit, counts, failures, notes=tuple(notes), seconds=seconds)
+
+
+def compile_for(job: Job) -> None:
+    """Compile, or load from disk, what the units of a job need; other processes then load it."""
+    if job.command == "solve":
+        from gough.fk.solve import FEW, Solver
+
+        limits = bool(job.options.get("limits")) or job.machine.limits is not None
+        for rows in (1, FEW + 1):
+            Solver(job.machine, "home", workers=1).compile(rows, limits=limits)
+    elif job.command == "modes":
+        assembly_modes(job.machine, job.machine.home_legs, workers=1)
 
 
 def _convert(job: Job, unit: Unit, out: Target, tick: Progress, threads: int) -> None:
