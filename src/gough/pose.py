@@ -373,18 +373,21 @@ def poses_from_columns(values: Array, names: Sequence[str]) -> tuple[Pose, Calla
 
 def pose_values(pose: Pose, angles: Angles | None) -> Array:
     """Values of the columns `pose_names(angles)`, (..., 7) or (..., 6)."""
-    names = pose_names(angles)[3:]
-    rotation = pose.rpy if names in AXES_AT_REST else pose.euler if angles else pose.wxyz
-    if in_degrees(angles):
-        rotation = np.degrees(rotation)
-    return np.concatenate([pose.position, rotation], axis=-1)
+    return np.concatenate([pose.position, _rotation_values(pose, angles)], axis=-1)
 
 
 def pose_table(pose: Pose, angles: Angles | None) -> dict[str, pa.Array]:
     """Columns of poses by name, batch axes flattened."""
     names = pose_names(angles)
-    columns = pose_values(pose, angles).reshape(-1, len(names)).T
+    position, rotation = pose.position.reshape(-1, 3), _rotation_values(pose, angles)
+    columns = [*position.T, *rotation.reshape(len(position), -1).T]
     return dict(zip(names, map(tables.number_column, columns), strict=True))
+
+
+def _rotation_values(pose: Pose, angles: Angles | None) -> Array:
+    names = pose_names(angles)[3:]
+    rotation = pose.rpy if names in AXES_AT_REST else pose.euler if angles else pose.wxyz
+    return np.degrees(rotation) if in_degrees(angles) else rotation
 
 
 def pose_cells(pose: Pose) -> list[str]:

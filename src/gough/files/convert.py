@@ -36,6 +36,7 @@ from gough.files.formats import (
 )
 from gough.files.log_format import LogFormat, time_column
 from gough.files.metadata import describe
+from gough.files.overlap import read_ahead, write_behind
 from gough.files.plausible import cause, check_plausible
 from gough.files.report import Report
 from gough.files.rows import Block, Reading, Sink, Source
@@ -106,7 +107,10 @@ def solve_file(
     report = Report(tuple(Status), head, frame or "")
     limits = platform.limits is not None if limits is None else limits
     written = solution_names(angles, leg_noise is not None, certify, follow is not None, limits)
-    with open_job(legs, out, platform, reading, file_leg_columns, written, frame) as job:
+    alone = settings.get("workers") == 1
+    with open_job(
+        legs, out, platform, reading, file_leg_columns, written, frame, alone=alone
+    ) as job:
         solver = Solver(platform, **settings)  # pyright: ignore[reportArgumentType]
         tracker = None if follow is None else _tracker(platform, settings, follow)
         report.time = "" if tracker else time_column(job.source.columns, reading.log)
@@ -223,6 +227,8 @@ def open_job(
     pick: Callable[[str, Sequence[str]], tuple[str, ...]],
     written: Sequence[str],
     frame: str | None = None,
+    *,
+    alone: bool = False,
 ) -> Iterator[_Job]:
     """Open both files, after all checks that need no rows.
 
@@ -230,6 +236,8 @@ def open_job(
         pick: chooses the columns to convert, as `leg_columns` does.
         written: names of the columns that results are written to.
         frame: whose poses are written, for the file's metadata.
+        alone: read and write on the calling thread. Pipes and devices always are, since a
+            thread that waits for one could not be ended.
     """
     _check_paths(path, out)
     check_kept(reading.keep, written)
@@ -240,7 +248,17 @@ def open_job(
         sink = stack.enter_context(open_sink(out, describe(platform, frame))) if out else None
         typed = out is not None and file_format(out) == ".parquet"
         blocks = source.blocks(numbers, keep, typed=typed)
+        if source.total is not None and not alone:
+            blocks = stack.enter_context(closing(read_ahead(blocks)))
+        if sink is not None and out is not None and not alone and _is_file(out):
+            sink = stack.enter_context(write_behind(sink))
         yield _Job(source, blocks, numbers, keep, sink)
+
+
+def _is_file(out: Out) -> bool:
+    """True for a plain file, or none yet; False for pipes and devices."""
+    path = Path(str(out))
+    return str(out) != STANDARD and (path.is_file() or not path.exists())
 
 
 def _check_paths(path: Given, out: Out | None) -> None:

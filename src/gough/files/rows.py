@@ -70,8 +70,9 @@ class Block:
 
         Absent values are NaN, and so are all values of a row that could not be read.
         """
-        array = np.stack([arrow_values(self.table.column(name)) for name in names], axis=-1)
+        array = np.empty((len(self), len(names)))
         for i, name in enumerate(names):
+            array[:, i] = arrow_values(self.table.column(name))
             if name in self.conversions:
                 factor, offset = self.conversions[name]
                 array[:, i] = factor * array[:, i] + offset
