@@ -42,7 +42,8 @@ def test_public_names_are_those_that_type_checkers_see(package: str) -> None:
     home = importlib.import_module(package)
     stub = ast.parse(Path(str(home.__file__)).with_suffix(".pyi").read_text("utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    names = {alias.name: f"{package}.{node.module}" for node in imports for alias in node.names}
+    homes = {node: f"{package}.{node.module}" if node.module else package for node in imports}
+    names = {alias.name: homes[node] for node in imports for alias in node.names}
     assert names.keys() == set(home.__all__) - {"__version__"}
     for name, module in names.items():
         assert getattr(home, name) is getattr(importlib.import_module(module), name)

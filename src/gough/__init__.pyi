@@ -1,5 +1,6 @@
 # The public names, once: type checkers read this file, and so does `__init__.py` when it runs.
 
+from . import cluster as cluster
 from .calibration.fit import calibrate as calibrate
 from .calibration.plan import Plan as Plan
 from .calibration.plan import plan_poses as plan_poses

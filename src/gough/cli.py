@@ -23,7 +23,12 @@ BAD_USAGE, BROKEN_PIPE = 2, 141
 # Commands that mostly load modules: looking for garbage meanwhile would be a tenth of their time.
 BRIEF = ("solve", "inverse", "modes", "check", "platforms")
 Functions = Callable[..., int] | dict[str, Callable[..., int]]  # dict: a family of commands
-EXTRAS = {"matplotlib": "plot", "viser": "view", "python_calamine": "excel"} | dict.fromkeys(
+EXTRAS = {
+    "matplotlib": "plot",
+    "viser": "view",
+    "python_calamine": "excel",
+    "ray": "cluster",
+} | dict.fromkeys(
     ("torch", "roma", "safetensors", "onnx", "onnxscript", "scipy", "tensorboard"), "learn"
 )
 

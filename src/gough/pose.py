@@ -380,7 +380,7 @@ def pose_table(pose: Pose, angles: Angles | None) -> dict[str, pa.Array]:
     """Columns of poses by name, batch axes flattened."""
     names = pose_names(angles)
     position, rotation = pose.position.reshape(-1, 3), _rotation_values(pose, angles)
-    columns = [*position.T, *rotation.reshape(len(position), -1).T]
+    columns = [*position.T, *rotation.reshape(-1, rotation.shape[-1]).T]
     return dict(zip(names, map(tables.number_column, columns), strict=True))
 
 

@@ -43,6 +43,14 @@ class JobOptions:
     stop_at_first_error: Annotated[
         bool, option("Stop at the first file that cannot be read or written.")
     ] = False
+    share: Annotated[
+        str | None,
+        option(
+            "Make every Nth file from the Kth on: so N machines share a folder, each with its own "
+            "K from 1 to N.",
+            "K/N",
+        ),
+    ] = None
     engine: Annotated[
         Literal["local", "ray"],
         arg(metavar="local|ray", help="Use processes of this machine, or a Ray cluster."),
@@ -123,7 +131,7 @@ def run_folder(
         with _progress() as tick:
             summary = run_job(
                 job, words, engine=jobs.engine, force=jobs.force, tick=tick, workers=workers,
-                stop_at_first_error=jobs.stop_at_first_error,
+                stop_at_first_error=jobs.stop_at_first_error, share=_share(jobs.share),
                 progress=lambda source, report: signals.check(), **settings,
             )  # fmt: skip
     except signals.Stopped as stop:
@@ -136,6 +144,18 @@ def run_folder(
     if summary.failed:
         return 2
     return 1 if summary.unusable and not allow_failures else 0
+
+
+def _share(text: str | None) -> tuple[int, int]:
+    """K and N of K/N."""
+    from gough.errors import InputError
+
+    if text is None:
+        return 1, 1
+    k, slash, n = text.partition("/")
+    if not (slash and k.isdecimal() and n.isdecimal()):
+        raise InputError(f"--share: expected K/N, such as 3/16, found {text!r}")
+    return int(k), int(n)
 
 
 @contextmanager

@@ -38,6 +38,7 @@ def run_job(
     engine: str = "local",
     force: bool = False,
     stop_at_first_error: bool = False,
+    share: tuple[int, int] = (1, 1),
     tick: Callable[[Summary, Made, list[Unit]], None] | None = None,
     **settings: Any,
 ) -> Summary:
@@ -49,6 +50,8 @@ def run_job(
         engine: "local", or "ray" for a cluster (extra `cluster`).
         force: make all outputs, whatever is there.
         stop_at_first_error: raise the first error of an input instead of going on.
+        share: make only the outputs k, k + n, k + 2 n ... of all, for (k, n); k counts from 1. So
+            several machines share a folder: the same job on each, with its own k.
         tick: called after every output with the summary so far, the output and all units.
         settings: of the engine, such as workers, or the address of a cluster.
 
@@ -66,7 +69,8 @@ def run_job(
     """
     began = time.perf_counter()
     run = find_engine(engine)
-    units = plan(job, inputs)
+    units = _share(plan(job, inputs), *share)
+    report = "report.json" if share[1] == 1 else f"report-{share[0]}-of-{share[1]}.json"
     if not job.out.store:
         _make_folder(job.out)
     done = {} if force else _finished(job, units)
@@ -94,10 +98,16 @@ def run_job(
         _tidy(job, units)  # after workers that died
         summary.seconds = time.perf_counter() - began
         try:
-            write_json(job.out / f"{FOLDER}/report.json", summary.facts())
+            write_json(job.out / f"{FOLDER}/{report}", summary.facts())
         except GoughError as error:  # a disk that is full: the summary is returned all the same
             log.warning("%s", error)
     return summary
+
+
+def _share(units: list[Unit], k: int, n: int) -> list[Unit]:
+    if not 1 <= k <= n:
+        raise GoughError(f"share: expected k of n with k from 1 to n, such as 3/16, found {k}/{n}")
+    return units[k - 1 :: n]
 
 
 def find_engine(name: str) -> Engine:

@@ -12,9 +12,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import llvmlite.binding as llvm
 import numba
 from numba.core import event
 from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.runtime.nrt import rtsys
 
 from gough import compiling, home_mode, status
@@ -39,7 +42,8 @@ def jit(*, fast: bool = True, cache: bool = True, **options) -> Callable[[Functi
             cannot cache; the code is then compiled anew in every process.
         options: passed on to `numba.njit`.
     """
-    settings = {"nogil": True, "fastmath": FAST if fast else False, "error_model": "numpy"}
+    settings: dict[str, Any] = {"nogil": True, "error_model": "numpy", "pipeline_class": _Compiler}
+    settings["fastmath"] = FAST if fast else False
 
     def decorate(function: Function) -> Function:
         try:
@@ -97,6 +101,32 @@ class _Cache(FunctionCache):
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
+
+
+class _Library(JITCodeLibrary):
+    """Compiled code that calls its own copies of inner functions.
+
+    Otherwise a process that compiles would call the copies that were made of each inner function
+    alone, and one that loads the code from disk those within it: optimised in other surroundings,
+    they may round differently in the last bit.
+    """
+
+    def _finalize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._finalize_final_module()
+
+
+class _Compiler(Compiler):
+    """Numba's compiler, into a `_Library`."""
+
+    def compile_extra(self, func: Callable) -> Any:
+        codegen = self.state.targetctx.codegen()  # pyright: ignore
+        library = _Library(codegen, func.__qualname__)
+        library.enable_object_caching()
+        self.state.library = library  # pyright: ignore
+        return super().compile_extra(func)
 
 
 class _Compiling(event.Listener):
