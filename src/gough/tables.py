@@ -201,7 +201,9 @@ def arrow_values(column: pa.ChunkedArray | pa.Array) -> Array:
         column = column.cast(pa.float64(), safe=False).fill_null(nan)
     chunks = column.chunks if isinstance(column, pa.ChunkedArray) else [column]
     parts = [np.from_dlpack(chunk) for chunk in chunks if len(chunk)]
-    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0), *parts])
+    if len(parts) == 1:
+        return parts[0].astype(np.float64, copy=False)
+    return np.concatenate([np.empty(0), *parts], dtype=np.float64)
 
 
 def number_column(values: NDArray) -> pa.Array:
