@@ -115,7 +115,7 @@ class Solver(_OnBatches):
     ) -> None:
         super().__init__(platform, keep)
         self.angles: Angles | None = angles
-        self.settings = {"workers": 1} | settings
+        self.settings: dict[str, Any] = {"workers": 1} | settings
         solution_names(angles, covariance=False, radius=False)
         _ = self._solver  # raises for a wrong setting, here and not on a node
 

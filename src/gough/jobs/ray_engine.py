@@ -7,6 +7,7 @@ at all: if its node dies, Ray runs it again on another, and no row is lost or do
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
@@ -111,7 +112,7 @@ def _connected(address: str | None, workers: int | None) -> Iterator[Any]:
         settings = {"num_cpus": max(workers or cores(), 2), "include_dashboard": False}
     with _own_signals():
         try:
-            ray.init(**settings, log_to_driver=False, logging_level="ERROR")
+            ray.init(**settings, log_to_driver=False, logging_level=logging.ERROR)
         except (ConnectionError, RuntimeError, ValueError) as error:
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
             raise GoughError(f"--address {address}: no Ray cluster answers: {reason}") from None
