@@ -407,7 +407,7 @@ def test_wrong_kinds_and_angles_are_named() -> None:
     found = gough.solve(PLATFORM, READINGS)
     with pytest.raises(gough.GoughError, match="kind: expected 'pandas', 'polars' or 'pyarrow'"):
         found.to_frame("excel")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(gough.GoughError, match="angles: expected one of 'deg', .* found 'turns'"):
+    with pytest.raises(gough.GoughError, match="angles: expected one of 'deg'"):
         found.to_frame(angles="turns")  # pyright: ignore[reportArgumentType]
 
 

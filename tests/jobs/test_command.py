@@ -117,7 +117,7 @@ def test_a_job_killed_at_random_moments_has_every_row_once(tmp_path, readings):
     write(tmp_path / "big.parquet", rows, group=8_000)
     arguments = ("solve", "big.parquet", "-p", "reference", "-o", "poses/", "--shard-rows", "8000")
     options = ("--seed", "home", "--keep", "id", "--workers", "2")
-    facts = kill_and_go_on([*arguments, *options], tmp_path / "poses", kills=2, longest=4)
+    facts = kill_and_go_on([*arguments, *options], tmp_path / "poses", kills=2, longest=1.5)
     assert facts["killed"]
     assert (facts["made_again"], facts["partial"], facts["code"]) == (0, 0, 0)
     table = ds.dataset(tmp_path / "poses", format="parquet", exclude_invalid_files=True).to_table()
