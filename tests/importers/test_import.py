@@ -154,6 +154,7 @@ SDF = to_sdf(Platform.load("reference"))
         ('<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>',
          "mjcf", "no two bodies are joined by six legs"),
         ("<mujoco><nonsense/></mujoco>", "mjcf", "MuJoCo refuses it"),
+        (re.sub('gear="[^"]*"', 'gear="0"', MJCF, count=1), "mjcf", "actuator leg1: its gear is 0"),
         (SDF.replace("<child>leg4_rod</child>", "<child>leg4_rot</child>"), "sdf",
          "no frame 'leg4_rot'"),
         (SDF.replace('name="leg4_platform" type="ball"', 'name="leg4_platform" type="screw"'),

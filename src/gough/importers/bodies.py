@@ -11,6 +11,7 @@ from gough.checks import Array
 from gough.pose import Pose
 
 WORLD = "world"  # the body that rests, where the file has one
+FARTHEST = 1e100  # numbers beyond it have squares that overflow
 Kind = Literal["hinge", "slide", "ball", "universal", "fixed"]
 
 

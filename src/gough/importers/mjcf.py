@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gough.errors import GoughError
-from gough.importers.bodies import WORLD, Joint, Kind, Model
+from gough.importers.bodies import FARTHEST, WORLD, Joint, Kind, Model
 from gough.pose import Pose
 
 CLOSED = 1e-6  # share of the model's extent by which a loop may be open
@@ -70,10 +70,12 @@ class _Reader:
         for key in range(min(self.model.nkey, 1)):
             self.mujoco.mj_resetDataKeyframe(self.model, self.data, key)
             self.mujoco.mj_kinematics(self.model, self.data)
-            if self._open() <= CLOSED * self.model.stat.extent:
+            if self._is_finite() and self._open() <= CLOSED * self.model.stat.extent:
                 return f"Home: keyframe {self.model.key(key).name or key}."
         self.mujoco.mj_resetData(self.model, self.data)
         self.mujoco.mj_kinematics(self.model, self.data)
+        if not self._is_finite():
+            raise GoughError("positions: expected finite numbers in the configuration of the file")
         gap = self._open()
         if gap > CLOSED * self.model.stat.extent:
             raise GoughError(
@@ -81,6 +83,11 @@ class _Reader:
                 "first keyframe, or a configuration, in which the legs meet the platform"
             )
         return "Home: the configuration of the file."
+
+    def _is_finite(self) -> bool:
+        data = self.data
+        places = data.xpos, data.xquat, data.xanchor, data.xaxis, data.site_xpos, data.qpos
+        return all(np.all(np.abs(array) < FARTHEST) for array in places)
 
     def _ends(self, k: int) -> tuple[int, int, Any, Any]:
         """The two bodies of an equality constraint, and its point in the world seen from each."""
@@ -144,7 +151,10 @@ class _Reader:
         gain, rank = 1.0, None
         if found:
             rank = found[0]
-            gain = 1 / float(model.actuator_gear[rank, 0])
+            gear = float(model.actuator_gear[rank, 0])
+            if gear == 0:
+                raise GoughError(f"actuator {model.actuator(rank).name}: its gear is 0")
+            gain = 1 / gear
             servo = float(model.actuator_biasprm[rank, 1]) < 0  # controls are readings
             if servo and model.actuator_ctrllimited[rank]:
                 low, high = model.actuator_ctrlrange[rank]

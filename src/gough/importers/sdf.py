@@ -9,7 +9,7 @@ import numpy as np
 
 from gough.checks import Array
 from gough.errors import GoughError
-from gough.importers.bodies import WORLD, Joint, Kind, Model
+from gough.importers.bodies import FARTHEST, WORLD, Joint, Kind, Model
 from gough.pose import Pose
 
 KINDS: dict[str, Kind] = {
@@ -133,7 +133,7 @@ def _numbers(where: str, element: ET.Element | None, count: int) -> Array:
         values = np.array(text.split(), float)
     except ValueError:
         raise GoughError(f"{where}: expected numbers, found {text.strip()!r}") from None
-    if values.shape != (count,) or not np.all(np.isfinite(values)):
+    if values.shape != (count,) or not np.all(np.abs(values) < FARTHEST):
         raise GoughError(f"{where}: expected {count} finite numbers, found {text.strip()!r}")
     if degrees:
         values[3:] = np.radians(values[3:])
