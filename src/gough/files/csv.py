@@ -164,7 +164,8 @@ class CsvSource:
         try:
             table = pacsv.read_csv(
                 pa.BufferReader(data),
-                read_options=pacsv.ReadOptions(column_names=self.columns),
+                # a thread of Arrow's that still holds the block when Python ends aborts the process
+                read_options=pacsv.ReadOptions(column_names=self.columns, use_threads=False),
                 parse_options=pacsv.ParseOptions(
                     delimiter=delimiter, newlines_in_values=b'"' in data
                 ),
