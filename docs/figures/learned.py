@@ -61,7 +61,7 @@ def disgnet() -> Figure:
     from gough.learn.data import HexapodGraph
 
     graph = HexapodGraph.of(gough.Platform.load("reference"))
-    whole = figure(7.4, 2.9)
+    whole = figure(7.4, 3.1)
     drawn, matrix, table = whole.subplots(1, 3)
     _graph(drawn, graph)
     _matrix(matrix, graph)
