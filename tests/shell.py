@@ -7,6 +7,7 @@ import io
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -97,3 +98,14 @@ def _bash(command: str) -> tuple[str, int]:
             },
         )
     return COMPILED.sub("", done.stdout), done.returncode
+
+
+def restore_signals() -> None:
+    """Give a new process, as `preexec_fn`, the signals of one that a terminal starts.
+
+    What started the tests may ignore signals (a shell SIGINT, nohup SIGHUP, pytest-xdist SIGTERM),
+    and children would inherit that.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+import shell
 
 from .conftest import EXAMPLE, command, environment, process
 
@@ -20,16 +21,9 @@ SLOW = ("--block-rows", 200)  # many blocks: time to interrupt
 
 
 def start(*arguments: object, **options) -> subprocess.Popen:
-    def restore() -> None:
-        # what started the tests may ignore signals (a shell SIGINT, nohup SIGHUP, pytest-xdist
-        # SIGTERM), and children would inherit that
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
     return subprocess.Popen(
         command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env=environment(), preexec_fn=restore, **options,
+        env=environment(), preexec_fn=shell.restore_signals, **options,
     )  # fmt: skip
 
 

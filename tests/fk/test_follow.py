@@ -39,8 +39,10 @@ def test_rows_are_what_a_tracker_says(name):
         pose = tracker.update(reading)
         assert (found.event[row], found.status[row]) == (tracker.event, tracker.status)
         if tracker.event.usable:
-            np.testing.assert_array_equal(found.pose.position[row], pose.position)
-            np.testing.assert_array_equal(found.pose.wxyz[row], pose.wxyz)
+            # two compiled functions: they may round differently in the last bits
+            rounding = 1e-13 * platform.size
+            np.testing.assert_allclose(found.pose.position[row], pose.position, 0, rounding)
+            np.testing.assert_allclose(found.pose.wxyz[row], pose.wxyz, 0, 1e-13)
         else:
             assert np.isnan(found.pose.position[row]).all()
             assert not found.usable[row]
@@ -61,7 +63,8 @@ def test_parts_of_a_series_are_the_series():
     alone = gough.Tracker(platform)
     for reading in legs:
         alone.update(reading)
-    np.testing.assert_array_equal(tracker.twist, alone.twist)
+    # `update` and `follow` are compiled each on its own: the last bits may differ
+    np.testing.assert_allclose(tracker.twist, alone.twist, 0, 1e-13 * platform.size)
     assert whole.covariance is not None
     frame = whole.to_frame("pyarrow")
     assert frame.column("event").to_pylist()[:2] == ["found", "followed"]

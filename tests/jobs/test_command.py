@@ -85,6 +85,7 @@ def test_ctrl_c_ends_the_workers_and_leaves_no_unfinished_file(tmp_path, reading
     run = subprocess.Popen(
         [sys.executable, "-m", "gough.cli", *arguments, "--workers", "2", "--seed", "home"],
         stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=shell.restore_signals,
     )  # fmt: skip
     until = time.monotonic() + 60
     while not [*tmp_path.glob("poses/big-*.parquet")] and time.monotonic() < until:

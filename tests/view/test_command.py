@@ -11,6 +11,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+import shell
 
 from gough import GoughError, cli
 from gough.view import server
@@ -116,8 +117,9 @@ def test_it_takes_the_next_port_that_is_free(monkeypatch):
 def test_ctrl_c_ends_it_quietly():
     command = [sys.executable, "-m", "gough.cli", "view", "-p", "reference", "--port", "0"]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=shell.restore_signals,
+    ) as process:  # fmt: skip
         assert process.stdout is not None
         where = process.stdout.readline()
         tunnel = process.stdout.readline()
