@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
@@ -29,7 +30,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
     scale = 10 if parser.parse_args().quick else 1
     dietmaier(100 // scale)
-    general(1000 // scale)
+    general(4000 // scale)
     special()
     times(2000 // scale)
     trajectory(10_000 // scale)
@@ -62,7 +63,8 @@ def general(count: int) -> None:
         began = time.perf_counter()
         solutions.append(find_start_system(platform).count)
         seconds.append(time.perf_counter() - began)
-    print(f"with 40 complex solutions {solutions.count(40)} of {count}")
+    for number, machines in sorted(Counter(solutions).items(), reverse=True):
+        print(f"with {number} complex solutions nearer than 2e4 sizes {machines}")
     print(f"start system of a platform: median {1e3 * np.median(seconds):.1f} ms")
 
 

@@ -90,6 +90,18 @@ def test_random_platforms_have_forty_solutions():
 
 
 @pytest.mark.parametrize(
+    ("seed", "count"),
+    [
+        (555730, 40),  # a path that takes the base joints there first is lost at 7e5 sizes
+        (429466, 38),  # two solutions at 1e5 sizes, which count as at infinity
+    ],
+)
+def test_solutions_that_pass_far_away_are_found_from_any_random_numbers(seed, count):
+    platform = general_platform(seed)
+    assert {find_start_system(platform, number).count for number in range(5, 25)} == {count}
+
+
+@pytest.mark.parametrize(
     ("base", "moving", "planar", "count"),
     [
         (range(6), range(6), True, 40),

@@ -5,10 +5,13 @@ machine's, then, with the roles of base and platform exchanged, the platform joi
 machines lose solutions to infinity on the way (28 of the 40 remain for a symmetric planar
 hexapod, 16 for a 6-3); the rest are checked by loops and kept. From then on each set of
 readings moves six squared lengths (rotary legs: the arms' tips too), and no path leaves.
+Where a path ends before the machine is reached, others take the platform joints first.
 
 The poses of a hexapod and the squared lengths they have form one irreducible variety (a graph
 over the group of motions), so closed loops in the complex squared lengths lead from any regular
-solution to every other: a set that many random loops map to itself has them all.
+solution to every other: a set that many random loops map to itself has them all. One
+that a loop brings back to where it began shows nothing, and for some solutions that is every
+second loop, so there are many, of many corners.
 """
 
 from __future__ import annotations
@@ -24,16 +27,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gough.errors import GoughError
-from gough.kernel.paths import LOST, Complex, LegEquations, track_paths
+from gough.kernel.paths import FINITE, LOST, Complex, LegEquations, track_paths
 from gough.kinematics import normalised_jacobian
 from gough.modes.frames import Frames, distances, distinct, inverse
 from gough.platform import Platform
 from gough.pose import Pose
 
 SEED = 5  # of all random numbers here
-LOOPS = 3  # that bring nothing new before a machine's list counts as complete
+LOOPS = 12  # that bring nothing new before a machine's list counts as complete
+CORNERS = 4  # of a loop, besides its start: more go round more branch points
 SPREAD = 0.5  # of the start's complex readings about those at home
-WIDE = 3.0  # the same of the corners of loops, which must go round the branch points
+WIDE = 10.0  # the same of the corners of loops, which must go round the branch points
 ROUTES = 4  # from the generic hexapod at most
 FAR = 2e4  # normalised distance beyond which a solution counts as being at infinity
 CACHED = 64  # machines kept in memory
@@ -138,11 +142,11 @@ def complete_by_loops(
 ) -> tuple[Complex, list[int]]:
     """All solutions that loops reach from `poses`, until `quiet` loops bring nothing new.
 
-    A loop carries the solutions round a random triangle; those whose paths arrive are kept.
+    A loop carries the solutions round a random polygon; those whose paths arrive are kept.
 
     Args:
         poses: (P, 7) solutions at `at`.
-        draw: a function that draws a corner of a triangle.
+        draw: a function that draws a corner of a polygon.
 
     Returns:
         The solutions, and how many there were after each loop.
@@ -150,7 +154,7 @@ def complete_by_loops(
     idle, history = 0, [len(poses)]
     while idle < quiet:
         here, moved = at, poses
-        for squares, base in [draw(rng), draw(rng), (at.squares, at.base)]:
+        for squares, base in [*(draw(rng) for _ in range(CORNERS)), (at.squares, at.base)]:
             moved = track_paths(moved, here, squares[None], base[None], share=CAREFUL).finite()
             here = LegEquations(base, at.moving, squares)
         poses = np.concatenate([poses, moved])
@@ -198,8 +202,8 @@ def _from_generic(at: LegEquations, rng: np.random.Generator) -> tuple[Complex, 
     another route too, and the lists are put together.
     """
     poses, history = np.zeros((0, 7), complex), [len(_generic()[1])]
-    for _ in range(ROUTES):
-        more, lost = _one_route(at, rng)
+    for route in range(ROUTES):
+        more, lost = _one_route(at, rng, platform_first=route % 2 == 1)
         poses = np.concatenate([poses, more])
         poses = poses[distinct(poses, APART)]
         history.append(len(poses))
@@ -208,8 +212,13 @@ def _from_generic(at: LegEquations, rng: np.random.Generator) -> tuple[Complex, 
     return poses, history
 
 
-def _one_route(at: LegEquations, rng: np.random.Generator) -> tuple[Complex, bool]:
-    """Base joints to the machine's, then platform joints, each over a random point.
+def _one_route(
+    at: LegEquations, rng: np.random.Generator, *, platform_first: bool
+) -> tuple[Complex, bool]:
+    """Base joints to the machine's and platform joints, each over a random point.
+
+    Args:
+        platform_first: the platform joints move before the base joints.
 
     Returns:
         Finite poses at `at`, and whether a path was lost on the way or met another.
@@ -217,17 +226,27 @@ def _one_route(at: LegEquations, rng: np.random.Generator) -> tuple[Complex, boo
     here, poses = _generic()
     size = np.mean(np.abs(at.squares))
     lost = False
-    for joints in (at.base, at.moving):
+    for half, exchanged in enumerate((platform_first, not platform_first)):
+        if exchanged:
+            poses, here = _exchanged(poses, here)
         detour = gaussian(rng, 6) * size, gaussian(rng, 6, 3)
-        last = at.squares if joints is at.moving else gaussian(rng, 6) * size
-        for squares, base in (detour, (last, joints)):
+        joints = at.moving if exchanged else at.base
+        last = (at.squares if half else gaussian(rng, 6) * size), joints
+        for step, (squares, base) in enumerate((detour, last)):
             ends = track_paths(poses, here, squares[None], base[None], share=CAREFUL)
             poses = ends.finite()
-            lost = lost or bool(np.any(ends.how == LOST))
+            arrived = half and step  # at the machine, where special ones have fewer solutions
+            lost = lost or bool(np.any(ends.how == LOST if arrived else ends.how != FINITE))
             lost = lost or len(distinct(poses, APART)) < len(poses)
             here = LegEquations(base, here.moving, squares)
-        poses, here = inverse(poses), LegEquations(here.moving, here.base, here.squares)
+        if exchanged:
+            poses, here = _exchanged(poses, here)
     return poses[np.abs(poses[:, :3]).max(axis=1, initial=0.0) < FAR], lost
+
+
+def _exchanged(poses: Complex, at: LegEquations) -> tuple[Complex, LegEquations]:
+    """The same machine with the roles of base and platform exchanged."""
+    return inverse(poses), LegEquations(at.moving, at.base, at.squares)
 
 
 def _first_of_pairs(frames: Frames, poses: Complex) -> NDArray[np.int64]:
