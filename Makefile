@@ -1,6 +1,6 @@
 # make solve   install the light core into .venv, solve a real machine's leg lengths
 # make test    install what the tests need as well, run them all
-# make quick   the tests that need no PyTorch, browser or new process, few random samples: 90 s
+# make quick   the tests that need no PyTorch, browser or new process, few random samples: a minute
 # make pictures   the documents' pictures, by the commands that stand beside them
 # make lint    ruff, pyright, layers    make docs    HTML into docs/_build    make bench    the tables
 # make release-check   build sdist and wheel, install the wheel into an empty environment, use it

@@ -30,7 +30,7 @@ from solver import peak_memory, processor
 
 import gough
 from gough.columns import LEGS
-from gough.jobs import Job, plan, run_job, run_local
+from gough.jobs import Job, make, plan, run_job, run_local
 from gough.kernel.threads import cores
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests/jobs"))
@@ -195,6 +195,47 @@ def killed(folder: Path, size: Sizes) -> dict[str, str]:
     }
 
 
+def store(folder: Path, size: Sizes) -> dict[str, str]:
+    """A job from and to an S3 server (moto) behind a proxy where one request in five fails."""
+    from s3 import s3_server
+
+    rows, found = size.rows // 10, {}
+    with s3_server() as (options, faults, direct):
+        for i in range(size.files // 4):
+            write_file(folder / "up.parquet", rows, seed=i)
+            with direct.open_output_stream(f"bucket/logs/{i:03}.parquet") as stream:
+                stream.write((folder / "up.parquet").read_bytes())
+        source = f"s3://bucket/logs{options}"
+        faults.share = 0.2
+        job = Job.of("solve", PLATFORM, f"s3://bucket/poses{options}", seed=SEED)
+        summary = run_job(job, [source])
+        faults.share = 0.0
+        counts = [
+            pq.read_metadata(stream).num_rows
+            for stream in map(direct.open_input_file, objects(direct, "bucket/poses"))
+        ]
+        hit = ", ".join(f"{faults.seen.get(kind, 0)} {kind}" for kind in ("503", "500", "cut"))
+        found[f"{size.files // 4} files of {rows:,} rows in S3; requests lost: {hit}"] = (
+            f"{summary.made} files made, {counts.count(rows)} of them with every row once"
+        )
+        other = Job.of("solve", PLATFORM, f"s3://bucket/other{options}", seed=SEED)
+        units = plan(other, [source])
+        faults.down = True
+        failed = make(other, units[0]).error
+        faults.down = False
+        left = len(objects(direct, "bucket/other"))
+        found["the same, the store down"] = f"{left} objects visible; it says: {failed}"
+    return found
+
+
+def objects(files, folder: str) -> list[str]:
+    """Paths of the Parquet files of a folder of a store."""
+    from pyarrow import fs
+
+    listed = files.get_file_info(fs.FileSelector(folder, recursive=True, allow_not_found=True))
+    return sorted(one.path for one in listed if one.path.endswith(".parquet"))
+
+
 # ---- speed and memory -------------------------------------------------------------------
 
 
@@ -271,6 +312,7 @@ PARTS: dict[str, Callable[[Path, Sizes], dict[str, str]]] = {
     "identical": identical,
     "lost_nodes": lost_nodes,
     "killed": killed,
+    "store": store,
     "speed": speed,
     "modes": modes,
     "memory": memory,
